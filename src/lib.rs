@@ -12,3 +12,4 @@
 //! `docs/ARCHITECTURE.md` draws the map; `tests/architecture.rs` keeps it true.
 
 pub mod geom;
+pub mod gpu;

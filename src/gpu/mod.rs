@@ -1,0 +1,130 @@
+//! The GPU: adapter, device, buffers, shader joining, timestamps.
+//!
+//! Knows no physics and no scene. Passes are built from [`Kernel`]s and pipelines made here.
+
+mod binding;
+mod buffer;
+mod error;
+mod shader;
+mod timer;
+
+pub use binding::{Binding, Kernel, bind, workgroups};
+pub use buffer::{read_buffer, read_texture_rgba8, read_texture_rgba16f, storage, uniform};
+pub use error::GpuError;
+pub use shader::{Wgsl, compile, join};
+pub use timer::{PassTime, Timer};
+
+/// Joins WGSL files of the `shaders` folder: `wgsl!["common.wgsl", "tangents.wgsl"]`.
+#[macro_export]
+macro_rules! wgsl {
+    ($($file:literal),+ $(,)?) => {
+        &[$($crate::gpu::Wgsl {
+            file: concat!("shaders/", $file),
+            source: include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $file)),
+        }),+]
+    };
+}
+
+/// A device and its queue.
+#[derive(Clone, Debug)]
+pub struct Gpu {
+    /// What every resource is made from.
+    pub device: wgpu::Device,
+    /// Where work is submitted.
+    pub queue: wgpu::Queue,
+    /// Name, backend and driver of the adapter, for logs and charts.
+    pub adapter: String,
+    /// Whether passes can be timed by the GPU itself.
+    pub has_timestamps: bool,
+    /// Nanoseconds a timestamp tick.
+    pub timestamp_period_ns: f32,
+}
+
+impl Gpu {
+    /// Opens the best adapter there is, without a window. A software adapter will do.
+    ///
+    /// # Errors
+    ///
+    /// [`GpuError::NoAdapter`] or [`GpuError::NoDevice`].
+    pub fn headless() -> Result<Self, GpuError> {
+        Self::open(&Self::instance(None), None)
+    }
+
+    /// The entry to the drivers. A window passes its `display`, which some systems need to present.
+    pub fn instance(display: Option<Box<dyn wgpu::wgt::WgpuHasDisplayHandle>>) -> wgpu::Instance {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+        descriptor.display = display;
+        wgpu::Instance::new(descriptor)
+    }
+
+    /// Opens an adapter that can present to `surface`, if there is one.
+    ///
+    /// # Errors
+    ///
+    /// [`GpuError::NoAdapter`] or [`GpuError::NoDevice`].
+    pub fn open(
+        instance: &wgpu::Instance,
+        surface: Option<&wgpu::Surface<'_>>,
+    ) -> Result<Self, GpuError> {
+        let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions {
+            power_preference: wgpu::PowerPreference::HighPerformance,
+            compatible_surface: surface,
+            ..Default::default()
+        }))
+        .map_err(GpuError::NoAdapter)?;
+        Self::with_adapter(&adapter)
+    }
+
+    fn with_adapter(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
+        let info = adapter.get_info();
+        let has_timestamps = adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY);
+        let offered = adapter.limits();
+        // WebGPU's default limits, so that what runs here runs anywhere, but buffers as large as
+        // the adapter has them: patches of a fine mesh are long lists.
+        let required_limits = wgpu::Limits {
+            max_buffer_size: offered.max_buffer_size,
+            max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
+            max_texture_dimension_2d: offered.max_texture_dimension_2d.min(16384),
+            ..wgpu::Limits::default()
+        }
+        .or_worse_values_from(&offered);
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("palpate"),
+            required_features: if has_timestamps {
+                wgpu::Features::TIMESTAMP_QUERY
+            } else {
+                wgpu::Features::empty()
+            },
+            required_limits,
+            ..Default::default()
+        }))
+        .map_err(GpuError::NoDevice)?;
+        Ok(Self {
+            timestamp_period_ns: queue.get_timestamp_period(),
+            device,
+            queue,
+            adapter: format!("{} ({:?}, {})", info.name, info.backend, info.driver_info),
+            has_timestamps,
+        })
+    }
+
+    /// Submits `encoder` and waits until the GPU has finished it.
+    pub fn submit_and_wait(&self, encoder: wgpu::CommandEncoder) {
+        self.queue.submit([encoder.finish()]);
+        self.wait();
+    }
+
+    /// Waits until everything submitted has finished.
+    pub fn wait(&self) {
+        // The only failure is a timeout, and no timeout is set.
+        let _ = self.device.poll(wgpu::PollType::wait_indefinitely());
+    }
+
+    /// An encoder for one frame.
+    pub fn encoder(&self) -> wgpu::CommandEncoder {
+        self.device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
+                label: Some("frame"),
+            })
+    }
+}
