@@ -2,6 +2,8 @@
 //!
 //! Nothing here knows of time, of the GPU or of scene files.
 
+pub mod ray;
+
 use glam::{Vec2, Vec3};
 
 /// A closed triangle surface with texture coordinates.

@@ -1,0 +1,24 @@
+# `make run` opens the window (or, without a display, replays the default scene into out/).
+# `make test` runs everything that CI runs.
+
+CARGO ?= cargo
+export XDG_RUNTIME_DIR ?= /tmp
+
+.PHONY: run test setup bench
+
+run: setup
+	$(CARGO) build --release
+	./target/release/palpate
+
+test: setup
+	$(CARGO) fmt --check
+	$(CARGO) clippy --all-targets -- -D warnings
+	$(CARGO) test
+	$(CARGO) run --quiet -- replay liver --frames 20 --size 320x240 --out out/ci-liver
+	$(CARGO) run --quiet -- replay liver-gooey --frames 20 --size 320x240 --out out/ci-gooey
+
+bench: setup
+	$(CARGO) bench
+
+setup:
+	@sh tests/setup.sh

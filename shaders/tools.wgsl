@@ -1,0 +1,70 @@
+// Rigid tools: spheres and capsules of polished steel, drawn over the tissue with its depth.
+//
+//   x = tip + r n'          for the half that faces away from the axis
+//   x = tip + axis + r n'   for the other half; n' = n turned so that +z lies along the axis
+//
+// Source:  Schlick, "An Inexpensive BRDF Model for Physically-based Rendering", 1994 (Fresnel term);
+//          the rest is a lamp above, a lamp beside and a dark floor, by eye.
+// Twin:    src/passes/tools.rs, fn capsule_point
+// Parity:  src/passes/tools.rs, fn every_vertex_lies_on_the_capsule
+// Threads: one a vertex; one a covered pixel.
+// Units:   metres; radiance in the units of the lights, W/(m2 sr).
+// Fails:   an axis shorter than 1e-6 m is a sphere.
+
+struct View {
+    clip_from_world: mat4x4f,
+    eye: vec4f,
+}
+
+struct Tool {
+    tip_radius: vec4f,
+    axis: vec4f,
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<storage, read> tools: array<Tool>;
+@group(0) @binding(2) var<storage, read> directions: array<vec4f>;
+
+struct Varyings {
+    @builtin(position) clip: vec4f,
+    @location(0) world: vec3f,
+    @location(1) normal: vec3f,
+}
+
+@vertex
+fn vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) index: u32) -> Varyings {
+    let tool = tools[index];
+    let n = directions[corner];
+    let length = length(tool.axis.xyz);
+    var along = vec3f(0.0, 0.0, 1.0);
+    if length > 1e-6 {
+        along = tool.axis.xyz / length;
+    }
+    var side = vec3f(1.0, 0.0, 0.0);
+    if abs(along.x) > 0.9 {
+        side = vec3f(0.0, 1.0, 0.0);
+    }
+    let across = normalize(cross(side, along));
+    let normal = n.x * across + n.y * cross(along, across) + n.z * along;
+    let world = tool.tip_radius.xyz + n.w * tool.axis.xyz + tool.tip_radius.w * normal;
+    return Varyings(view.clip_from_world * vec4f(world, 1.0), world, normal);
+}
+
+// What a polished surface mirrors in this room: two soft lamps and a floor.
+fn room(direction: vec3f) -> vec3f {
+    let up = smoothstep(-0.2, 1.0, direction.y);
+    let lamp = smoothstep(0.86, 0.97, dot(direction, normalize(vec3f(-0.35, 0.85, 0.4))));
+    let rim = smoothstep(0.8, 0.98, dot(direction, normalize(vec3f(0.9, 0.15, -0.3))));
+    return mix(vec3f(0.02, 0.022, 0.025), vec3f(0.20, 0.22, 0.24), up)
+        + 2.2 * lamp * vec3f(1.0, 0.97, 0.92) + 0.5 * rim * vec3f(0.7, 0.85, 1.0);
+}
+
+@fragment
+fn fragment(in: Varyings) -> @location(0) vec4f {
+    let normal = normalize(in.normal);
+    let to_eye = normalize(view.eye.xyz - in.world);
+    let cos_view = max(dot(normal, to_eye), 0.0);
+    let steel = vec3f(0.62, 0.62, 0.64);
+    let fresnel = steel + (1.0 - steel) * pow(1.0 - cos_view, 5.0);
+    return vec4f(fresnel * room(reflect(-to_eye, normal)), 1.0);
+}

@@ -1,0 +1,63 @@
+//! Scenes, organs and textures inside the binary, so that it runs from any folder.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+macro_rules! bundle {
+    ($($file:literal),* $(,)?) => {
+        &[$(($file, include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/", $file)))),*]
+    };
+}
+
+/// Files that bundled scenes name, by their path below `scenes/`.
+const FILES: &[(&str, &[u8])] = bundle![
+    "organs/liver.glb",
+    "organs/heart.glb",
+    "textures/liver-outer.png",
+    "textures/liver-normal.png",
+    "textures/liver-inner.png",
+    "textures/liver-layers.png",
+    "textures/heart-outer.png",
+    "textures/heart-normal.png",
+    "textures/heart-inner.png",
+    "textures/heart-layers.png",
+];
+
+/// Bundled scenes, the default one first.
+const SCENES: &[(&str, &str)] = &[
+    ("liver", include_str!("../../scenes/liver.toml")),
+    ("liver-gooey", include_str!("../../scenes/liver-gooey.toml")),
+    ("heart", include_str!("../../scenes/heart.toml")),
+    ("slab", include_str!("../../scenes/slab.toml")),
+];
+
+/// The scene of a window that was told none.
+pub const DEFAULT_SCENE: &str = "liver";
+
+/// Name and text of each bundled scene.
+pub fn scenes() -> &'static [(&'static str, &'static str)] {
+    SCENES
+}
+
+/// The text of a bundled scene.
+pub fn scene(name: &str) -> Option<&'static str> {
+    SCENES
+        .iter()
+        .find(|(known, _)| *known == name)
+        .map(|(_, text)| *text)
+}
+
+/// The bytes of a bundled file, or of a file on disk.
+///
+/// # Errors
+///
+/// What the system says about a file that can't be read.
+pub fn read(path: &Path) -> std::io::Result<Cow<'static, [u8]>> {
+    let bundled = path
+        .to_str()
+        .and_then(|name| FILES.iter().find(|(known, _)| *known == name));
+    match bundled {
+        Some((_, bytes)) => Ok(Cow::Borrowed(*bytes)),
+        None => std::fs::read(path).map(Cow::Owned),
+    }
+}

@@ -1,0 +1,62 @@
+//! Where everything meets: sessions, the replay, the window, and the commands that read and list.
+
+mod assets;
+mod check;
+mod dump;
+mod error;
+mod hand;
+mod history;
+mod knobs;
+mod load;
+mod orbit;
+mod panel;
+mod renderer;
+mod replay;
+mod script;
+mod session;
+mod window;
+
+pub use assets::DEFAULT_SCENE;
+pub use check::check;
+pub use error::AppError;
+pub use replay::{ReplayOptions, replay};
+pub use session::{Marker, Session, Tick};
+pub use window::window;
+
+/// Version and commit.
+pub const VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    " (",
+    env!("PALPATE_COMMIT"),
+    ")"
+);
+
+/// How a command ended when nothing went wrong with it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// It did what it was asked.
+    Done,
+    /// A comparison found a difference.
+    Differs,
+}
+
+/// Prints the bundled scenes, a line each.
+///
+/// # Errors
+///
+/// [`AppError::Scene`] if a bundled scene is broken.
+pub fn list_scenes() -> Result<Outcome, AppError> {
+    for (name, _) in assets::scenes() {
+        let scene = load::scene(name, &[])?;
+        println!("{name:<14} {}", scene.title);
+    }
+    Ok(Outcome::Done)
+}
+
+/// Threads to simulate with: as told, or as many as the machine has.
+fn thread_count(told: Option<u32>) -> usize {
+    told.map_or_else(
+        || std::thread::available_parallelism().map_or(1, usize::from),
+        |threads| threads as usize,
+    )
+}

@@ -1,0 +1,127 @@
+//! The window's camera: it orbits a place, and turns a cursor into a ray.
+
+use glam::{Mat4, Vec2, Vec3};
+
+/// A half-line in the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where it starts [m].
+    pub origin: Vec3,
+    /// Unit direction.
+    pub direction: Vec3,
+}
+
+/// A camera that looks at a place from a distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Orbit {
+    /// What it looks at [m].
+    pub target: Vec3,
+    /// Distance to it [m].
+    pub distance_m: f32,
+    /// Angle about the vertical; 0 looks along −z [rad].
+    pub yaw: f32,
+    /// Angle above the horizon [rad].
+    pub pitch: f32,
+    /// Vertical view angle [rad].
+    pub fov_y: f32,
+}
+
+impl Orbit {
+    /// The orbit of a camera at `eye` that looks at `target`.
+    pub fn new(eye: Vec3, target: Vec3, fov_y: f32) -> Self {
+        let back = eye - target;
+        let distance_m = back.length();
+        Self {
+            target,
+            distance_m,
+            yaw: back.x.atan2(back.z),
+            pitch: (back.y / distance_m).clamp(-1.0, 1.0).asin(),
+            fov_y,
+        }
+    }
+
+    /// Where the camera is [m].
+    pub fn eye(&self) -> Vec3 {
+        let (sin_yaw, cos_yaw) = self.yaw.sin_cos();
+        let (sin_pitch, cos_pitch) = self.pitch.sin_cos();
+        self.target
+            + self.distance_m * Vec3::new(cos_pitch * sin_yaw, sin_pitch, cos_pitch * cos_yaw)
+    }
+
+    /// Turns by a mouse movement in shares of the window's height.
+    pub fn turn(&mut self, by: Vec2) {
+        self.yaw -= 3.5 * by.x;
+        // Short of the poles, where up is undefined.
+        self.pitch = (self.pitch + 3.5 * by.y).clamp(-1.5, 1.5);
+    }
+
+    /// Moves the target sideways by a mouse movement in shares of the window's height.
+    pub fn pan(&mut self, by: Vec2) {
+        let forward = (self.target - self.eye()).normalize_or(Vec3::NEG_Z);
+        let right = forward.cross(Vec3::Y).normalize_or(Vec3::X);
+        let up = right.cross(forward);
+        let metres = 2.0 * self.distance_m * (0.5 * self.fov_y).tan();
+        self.target += metres * (up * by.y - right * by.x);
+    }
+
+    /// Comes nearer by wheel notches; `body_m` bounds the distance.
+    pub fn zoom(&mut self, notches: f32, body_m: f32) {
+        self.distance_m =
+            (self.distance_m * (-0.12 * notches).exp()).clamp(0.3 * body_m, 20.0 * body_m);
+    }
+
+    /// The ray through a place of the picture: (0, 0) is its top left corner, (1, 1) its bottom right.
+    pub fn ray(&self, at: Vec2, aspect: f32) -> Ray {
+        let eye = self.eye();
+        let world_from_view = Mat4::look_at_rh(eye, self.target, Vec3::Y).inverse();
+        let half_height = (0.5 * self.fov_y).tan();
+        let in_view = Vec3::new(
+            (2.0 * at.x - 1.0) * half_height * aspect,
+            (1.0 - 2.0 * at.y) * half_height,
+            -1.0,
+        );
+        Ray {
+            origin: eye,
+            direction: world_from_view
+                .transform_vector3(in_view)
+                .normalize_or(Vec3::NEG_Z),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn orbit() -> Orbit {
+        Orbit::new(Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.0, 0.5, 0.0), 0.6)
+    }
+
+    #[test]
+    fn an_orbit_is_where_it_was_made() {
+        assert!((orbit().eye() - Vec3::new(1.0, 2.0, 3.0)).length() < 1e-5);
+    }
+
+    #[test]
+    fn the_ray_through_the_middle_meets_the_target() {
+        let ray = orbit().ray(Vec2::splat(0.5), 4.0 / 3.0);
+        let to_target = (orbit().target - ray.origin).normalize();
+        assert!(ray.direction.dot(to_target) > 1.0 - 1e-5, "{ray:?}");
+    }
+
+    #[test]
+    fn a_corner_ray_leaves_by_half_the_view_angle() {
+        let straight = orbit().ray(Vec2::splat(0.5), 1.0).direction;
+        let top = orbit().ray(Vec2::new(0.5, 0.0), 1.0).direction;
+        assert!((straight.angle_between(top) - 0.3).abs() < 1e-4);
+    }
+
+    #[test]
+    fn turning_keeps_the_distance_and_stays_off_the_poles() {
+        let mut orbit = orbit();
+        let distance_m = orbit.distance_m;
+        orbit.turn(Vec2::new(0.3, 9.0));
+        assert!((orbit.eye().distance(orbit.target) - distance_m).abs() < 1e-5);
+        assert!(orbit.pitch < std::f32::consts::FRAC_PI_2);
+    }
+}

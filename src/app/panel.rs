@@ -1,0 +1,396 @@
+//! The panel beside the scene: choosers, knobs, plots and read-outs.
+//!
+//! It changes plain data in the session and the panel's own state, and asks the window for what more that
+//! needs. It draws nothing of the scene but the finished picture.
+
+use super::hand::HandKnobs;
+use super::history::History;
+use super::{Session, assets};
+use crate::geom::plane::LightPathMethod;
+use crate::scene::SurfaceKind;
+use crate::sim::Method;
+use egui::{Align2, Color32, ComboBox, RichText, Slider, Ui};
+use egui_plot::{Bar, BarChart, Legend, Line, Plot, PlotPoints};
+
+/// What the panel shows and what was switched in it.
+pub struct PanelState {
+    /// Scene that runs.
+    pub scene_name: String,
+    /// How the hand prods.
+    pub hand: HandKnobs,
+    /// Whether time stands still.
+    pub paused: bool,
+    /// One time step is wanted though time stands still.
+    pub step_once: bool,
+    /// A picture is to be saved.
+    pub screenshot: bool,
+    /// Whether the panel is shown.
+    pub panel_open: bool,
+    /// Whether the list of keys is shown.
+    pub help_open: bool,
+    /// Something changed that is not on the screen yet.
+    pub wants_frame: bool,
+    /// The body sleeps.
+    pub asleep: bool,
+    /// Particles that were contained.
+    pub frozen_particles: u32,
+    /// The last thing that went wrong.
+    pub error: Option<String>,
+    /// The last thing that was done.
+    pub message: String,
+}
+
+/// What only the window can do.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PanelAsk {
+    /// Load another scene.
+    Scene(String),
+    /// Build the passes anew: another surface or light path.
+    Rebuild,
+    /// Send changed knobs of the surface to the GPU.
+    SurfaceKnobs,
+    /// Take over changed knobs of the solver.
+    Solver,
+    /// Back to rest.
+    Reset,
+    /// Play the scene's script from its start.
+    PlayScript,
+    /// Back to the scene's camera.
+    ResetCamera,
+}
+
+impl PanelState {
+    /// The state of a window that was just opened.
+    pub fn new(scene_name: &str, hand: HandKnobs) -> Self {
+        Self {
+            scene_name: scene_name.to_owned(),
+            hand,
+            paused: false,
+            step_once: false,
+            screenshot: false,
+            panel_open: true,
+            help_open: false,
+            wants_frame: true,
+            asleep: false,
+            frozen_particles: 0,
+            error: None,
+            message: String::new(),
+        }
+    }
+}
+
+/// Draws panel and picture; returns where the picture is, in points.
+pub fn show(
+    ui: &mut Ui,
+    state: &mut PanelState,
+    session: &mut Session,
+    history: &History,
+    picture: egui::TextureId,
+    asks: &mut Vec<PanelAsk>,
+) -> egui::Rect {
+    if state.panel_open {
+        egui::Panel::right("panel")
+            .default_size(300.0)
+            .show(ui, |ui| {
+                egui::ScrollArea::vertical().show(ui, |ui| {
+                    run_section(ui, state, session, asks);
+                    readings(ui, state, session, history);
+                    surface_section(ui, session, asks);
+                    light_path_section(ui, session, asks);
+                    solver_section(ui, session, asks);
+                    hand_section(ui, state, session);
+                });
+            });
+    }
+    let view = egui::CentralPanel::no_frame()
+        .show(ui, |ui| {
+            let rect = ui.available_rect_before_wrap();
+            egui::Image::new((picture, rect.size())).paint_at(ui, rect);
+            rect
+        })
+        .inner;
+    hint(ui, state, view);
+    if state.help_open {
+        help(ui, state);
+    }
+    if let Some(error) = state.error.clone() {
+        egui::Window::new("Something is wrong")
+            .anchor(Align2::CENTER_TOP, [0.0, 12.0])
+            .collapsible(false)
+            .resizable(false)
+            .show(ui.ctx(), |ui| {
+                ui.label(error);
+                if ui.button("Dismiss").clicked() {
+                    state.error = None;
+                }
+            });
+    }
+    view
+}
+
+fn run_section(
+    ui: &mut Ui,
+    state: &mut PanelState,
+    session: &mut Session,
+    asks: &mut Vec<PanelAsk>,
+) {
+    ui.add_space(6.0);
+    ui.horizontal(|ui| {
+        ui.heading("palpate");
+        ComboBox::from_id_salt("scene")
+            .selected_text(&state.scene_name)
+            .show_ui(ui, |ui| {
+                for (name, _) in assets::scenes() {
+                    let is_this = state.scene_name == *name;
+                    if ui.selectable_label(is_this, *name).clicked() && !is_this {
+                        asks.push(PanelAsk::Scene((*name).to_owned()));
+                    }
+                }
+            });
+    });
+    ui.label(RichText::new(&session.scene.title).weak());
+    ui.horizontal(|ui| {
+        let label = if state.paused { "Resume" } else { "Pause" };
+        if ui.button(label).clicked() {
+            state.paused = !state.paused;
+        }
+        if ui.button("Step").clicked() {
+            state.paused = true;
+            state.step_once = true;
+        }
+        if ui.button("Reset").clicked() {
+            asks.push(PanelAsk::Reset);
+        }
+        if ui.button("Script").clicked() {
+            asks.push(PanelAsk::PlayScript);
+        }
+        if ui.button("Camera").clicked() {
+            asks.push(PanelAsk::ResetCamera);
+        }
+    });
+}
+
+fn readings(ui: &mut Ui, state: &PanelState, session: &Session, history: &History) {
+    ui.separator();
+    let Some(last) = history.last() else {
+        ui.label("waiting for the first time step");
+        return;
+    };
+    egui::Grid::new("readings").num_columns(4).show(ui, |ui| {
+        ui.label("force");
+        ui.label(RichText::new(format!("{:.2} N", last.force_n)).strong());
+        ui.label("volume");
+        ui.label(format!("{:+.2} %", 100.0 * last.volume_drift));
+        ui.end_row();
+        ui.label("time");
+        ui.label(format!("{:.2} s", session.time_s()));
+        ui.label("depth");
+        ui.label(format!("{:.2} mm", 1e3 * last.penetration_m));
+        ui.end_row();
+    });
+    if state.frozen_particles > 0 {
+        ui.colored_label(
+            Color32::from_rgb(230, 120, 60),
+            format!(
+                "{} particles went astray and are held: reset to free them",
+                state.frozen_particles
+            ),
+        );
+    } else if state.asleep {
+        ui.label(RichText::new("asleep: nothing moves").weak());
+    }
+    stage_plot(ui, history);
+    force_plot(ui, history);
+}
+
+/// Colours of the stages, in their order; from a scale that colour-blind readers can tell apart.
+const STAGE_COLORS: [Color32; 8] = [
+    Color32::from_rgb(0x44, 0x77, 0xaa),
+    Color32::from_rgb(0xee, 0x66, 0x77),
+    Color32::from_rgb(0x22, 0x88, 0x33),
+    Color32::from_rgb(0xcc, 0xbb, 0x44),
+    Color32::from_rgb(0x66, 0xcc, 0xee),
+    Color32::from_rgb(0xaa, 0x33, 0x77),
+    Color32::from_rgb(0xee, 0x99, 0x66),
+    Color32::from_rgb(0xbb, 0xbb, 0xbb),
+];
+
+fn stage_plot(ui: &mut Ui, history: &History) {
+    ui.label(RichText::new("frame time by stage [ms]").weak());
+    let mut charts: Vec<BarChart> = Vec::new();
+    for (index, stage) in history.stages().into_iter().enumerate() {
+        let bars = history
+            .iter()
+            .enumerate()
+            .map(|(frame, sample)| Bar::new(frame as f64, f64::from(sample.stage_ms(stage))))
+            .collect();
+        let chart = BarChart::new(stage, bars)
+            .width(1.0)
+            .color(STAGE_COLORS[index % STAGE_COLORS.len()])
+            .stack_on(&charts.iter().collect::<Vec<_>>());
+        charts.push(chart);
+    }
+    let wall: PlotPoints = history
+        .iter()
+        .enumerate()
+        .map(|(frame, sample)| [frame as f64, f64::from(sample.wall_ms)])
+        .collect();
+    still_plot("stages")
+        .height(150.0)
+        .legend(Legend::default())
+        .show(ui, |plot| {
+            for chart in charts {
+                plot.bar_chart(chart);
+            }
+            plot.line(Line::new("whole frame", wall).color(Color32::WHITE));
+        });
+}
+
+fn force_plot(ui: &mut Ui, history: &History) {
+    ui.label(RichText::new("force on the tool [N]").weak());
+    let force: PlotPoints = history
+        .iter()
+        .enumerate()
+        .map(|(frame, sample)| [frame as f64, f64::from(sample.force_n)])
+        .collect();
+    still_plot("force").height(70.0).show(ui, |plot| {
+        plot.line(Line::new("force", force).color(STAGE_COLORS[1]));
+    });
+}
+
+/// A plot that only shows: the mouse belongs to the scene.
+fn still_plot(id: &str) -> Plot<'_> {
+    Plot::new(id)
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .include_y(0.0)
+        .show_axes([false, true])
+}
+
+fn surface_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAsk>) {
+    ui.separator();
+    ui.strong("Surface");
+    let surface = &mut session.scene.surface;
+    ui.horizontal(|ui| {
+        for kind in [
+            SurfaceKind::Plain,
+            SurfaceKind::Gooey,
+            SurfaceKind::Subsurface,
+        ] {
+            if ui
+                .selectable_value(&mut surface.kind, kind, kind.name())
+                .changed()
+            {
+                asks.push(PanelAsk::Rebuild);
+            }
+        }
+    });
+    let change = super::knobs::surface(ui, surface);
+    asks.extend(change);
+}
+
+fn light_path_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAsk>) {
+    if session.scene.surface.kind != SurfaceKind::Subsurface {
+        return;
+    }
+    ui.separator();
+    ui.strong("Light path");
+    let method = &mut session.scene.light_path.method;
+    ComboBox::from_id_salt("light path")
+        .selected_text(method.name())
+        .show_ui(ui, |ui| {
+            for other in LightPathMethod::ALL {
+                if ui
+                    .selectable_value(method, other, other.name())
+                    .changed()
+                {
+                    asks.push(PanelAsk::Rebuild);
+                }
+            }
+        });
+}
+
+fn solver_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAsk>) {
+    ui.separator();
+    ui.strong("Solver");
+    let solver = &mut session.scene.solver;
+    let before = *solver;
+    ComboBox::from_id_salt("solver")
+        .selected_text(solver.method.name())
+        .show_ui(ui, |ui| {
+            for method in Method::ALL {
+                ui.selectable_value(&mut solver.method, method, method.name());
+            }
+        });
+    ui.add(
+        Slider::new(&mut solver.youngs_modulus_pa, 500.0..=100_000.0)
+            .logarithmic(true)
+            .text("Young's modulus [Pa]"),
+    );
+    ui.add(Slider::new(&mut solver.poisson_ratio, 0.0..=0.49).text("Poisson ratio"));
+    ui.add(Slider::new(&mut solver.substeps, 1..=60).text("substeps"));
+    ui.add(Slider::new(&mut solver.iterations, 1..=10).text("iterations"));
+    if *solver != before {
+        asks.push(PanelAsk::Solver);
+    }
+}
+
+fn hand_section(ui: &mut Ui, state: &mut PanelState, session: &Session) {
+    ui.separator();
+    ui.strong("Hand");
+    let longest_m = session.rest.longest_m();
+    let hand = &mut state.hand;
+    ui.add(Slider::new(&mut hand.radius_m, 0.01 * longest_m..=0.2 * longest_m).text("radius [m]"));
+    ui.add(Slider::new(&mut hand.depth_m, 0.0..=0.3 * longest_m).text("depth [m]"));
+    ui.add(Slider::new(&mut hand.friction, 0.0..=1.0).text("friction"));
+    if !state.message.is_empty() {
+        ui.separator();
+        ui.label(RichText::new(&state.message).weak());
+    }
+}
+
+fn hint(ui: &Ui, state: &PanelState, view: egui::Rect) {
+    let text = if state.paused {
+        "paused: Space resumes, N makes one step"
+    } else {
+        "left drag pushes · right drag grabs · middle drag orbits · wheel: depth or zoom · H: keys"
+    };
+    ui.painter().text(
+        view.left_bottom() + egui::vec2(10.0, -8.0),
+        Align2::LEFT_BOTTOM,
+        text,
+        egui::FontId::proportional(12.0),
+        Color32::from_white_alpha(140),
+    );
+}
+
+fn help(ui: &Ui, state: &mut PanelState) {
+    egui::Window::new("Keys and mouse")
+        .open(&mut state.help_open)
+        .resizable(false)
+        .show(ui.ctx(), |ui| {
+            egui::Grid::new("keys").num_columns(2).show(ui, |ui| {
+                for (what, does) in [
+                    ("left drag on the organ", "push the tool into it"),
+                    ("right drag on the organ", "grab it"),
+                    ("middle drag, or left beside it", "orbit"),
+                    ("right drag beside it", "move the view"),
+                    ("wheel", "zoom; while pushing, the depth"),
+                    ("Space", "pause or resume"),
+                    ("N or .", "one time step"),
+                    ("R", "reset to rest"),
+                    ("P", "play the scene's script"),
+                    ("C", "back to the scene's camera"),
+                    ("S or F12", "save a picture"),
+                    ("Tab", "hide or show the panel"),
+                    ("H or F1", "this list"),
+                ] {
+                    ui.strong(what);
+                    ui.label(does);
+                    ui.end_row();
+                }
+            });
+        });
+}

@@ -1,0 +1,209 @@
+//! A running scene: one path for a frame, the same in window and replay.
+
+use super::AppError;
+use super::load::{self, LoadedBody};
+use super::script::Script;
+use crate::geom::SurfaceMesh;
+use crate::geom::ray::nearest_point;
+use crate::scene::{MarkerSection, RestBox, Scene};
+use crate::sim::{Simulation, StepReport, ToolAction, ToolInput, ToolShape};
+use glam::Vec3;
+use sha2::{Digest, Sha256};
+use std::time::Instant;
+
+/// A body, its script and its time.
+pub struct Session {
+    /// What runs.
+    pub scene: Scene,
+    /// The surface at rest.
+    pub mesh: SurfaceMesh,
+    /// The box around it.
+    pub rest: RestBox,
+    /// What was guessed or repaired while loading.
+    pub notes: Vec<String>,
+    /// Whether the scripted tools move; without it they are not there.
+    pub script_plays: bool,
+    /// The tool in the user's hand, if any.
+    pub hand: Option<ToolInput>,
+    simulation: Simulation,
+    script: Script,
+    markers: Vec<Marker>,
+    frame: u32,
+    pool: rayon::ThreadPool,
+}
+
+/// What one time step did.
+#[derive(Clone, Debug)]
+pub struct Tick {
+    /// What the simulation reports.
+    pub report: StepReport,
+    /// Wall time of the step [ms].
+    pub sim_ms: f32,
+    /// The tools as they were at the end of the step: the script's, then the hand.
+    pub tools: Vec<ToolInput>,
+}
+
+/// A followed place.
+#[derive(Clone, Debug)]
+pub struct Marker {
+    /// Name in `summary.json`.
+    pub name: String,
+    /// Surface points whose mean is followed.
+    points: Vec<u32>,
+    /// Where it was at rest [m].
+    pub rest_m: Vec3,
+}
+
+impl Session {
+    /// Loads the body of `scene` and places its script.
+    ///
+    /// # Errors
+    ///
+    /// [`AppError`] naming the file or the key that is wrong.
+    pub fn new(scene: Scene, threads: usize) -> Result<Self, AppError> {
+        let LoadedBody {
+            mesh,
+            rest,
+            setup,
+            notes,
+        } = load::body(&scene)?;
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(|e| AppError::Body(format!("{threads} threads can't be started: {e}")))?;
+        let markers = scene
+            .markers
+            .iter()
+            .map(|section| Marker::new(section, &mesh, &rest))
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            script: Script::new(&scene.tools, &mesh, &rest),
+            simulation: Simulation::new(setup, scene.solver),
+            script_plays: true,
+            hand: None,
+            frame: 0,
+            scene,
+            mesh,
+            rest,
+            notes,
+            markers,
+            pool,
+        })
+    }
+
+    /// Runs one time step.
+    pub fn tick(&mut self) -> Tick {
+        self.frame += 1;
+        let mut tools = self.script.at(self.time_s());
+        if !self.script_plays {
+            tools.clear();
+        }
+        // The hand keeps its place in the list, so that letting go is a change of action.
+        tools.push(self.hand.unwrap_or(ABSENT_HAND));
+        let start = Instant::now();
+        let report = self.pool.install(|| self.simulation.step(&tools));
+        Tick {
+            report,
+            sim_ms: start.elapsed().as_secs_f32() * 1e3,
+            tools,
+        }
+    }
+
+    /// Back to rest at time 0.
+    pub fn reset(&mut self) {
+        self.frame = 0;
+        self.simulation.reset();
+    }
+
+    /// Takes over changed solver knobs.
+    pub fn set_solver(&mut self) {
+        self.simulation.set_params(self.scene.solver);
+    }
+
+    /// Time steps since the start.
+    pub fn frame(&self) -> u32 {
+        self.frame
+    }
+
+    /// Simulated time [s].
+    pub fn time_s(&self) -> f32 {
+        self.frame as f32 * self.scene.solver.timestep_s
+    }
+
+    /// Where the surface points are [m].
+    pub fn points(&self) -> &[Vec3] {
+        self.simulation.points()
+    }
+
+    /// Number of tetrahedra.
+    pub fn tet_count(&self) -> usize {
+        self.simulation.tet_count()
+    }
+
+    /// SHA-256 of the particle positions, as little-endian f32, in hexadecimal.
+    pub fn state_sha256(&self) -> String {
+        let mut hash = Sha256::new();
+        for x in self.simulation.particles() {
+            for component in x.to_array() {
+                hash.update(component.to_le_bytes());
+            }
+        }
+        hash.finalize().iter().map(|b| format!("{b:02x}")).collect()
+    }
+
+    /// Each followed place, and where it is now [m].
+    pub fn markers(&self) -> impl Iterator<Item = (&Marker, Vec3)> {
+        self.markers
+            .iter()
+            .map(|marker| (marker, mean(&marker.points, self.points())))
+    }
+}
+
+/// A hand that holds nothing: far away, doing nothing.
+const ABSENT_HAND: ToolInput = ToolInput {
+    shape: ToolShape::Sphere { radius_m: 0.0 },
+    position_m: Vec3::ZERO,
+    action: ToolAction::Idle,
+    friction: 0.0,
+};
+
+impl Marker {
+    fn new(section: &MarkerSection, mesh: &SurfaceMesh, rest: &RestBox) -> Result<Self, AppError> {
+        let points = match rest.place(section.nearest_m, section.nearest_share) {
+            Some(place) => nearest_point(place, &mesh.points)
+                .map(|i| vec![i as u32])
+                .unwrap_or_default(),
+            None => {
+                let corner = |k: usize| {
+                    rest.place(
+                        section.mean_box_m.map(|b| b[k]),
+                        section.mean_box_share.map(|b| b[k]),
+                    )
+                    .expect("a checked marker has a place")
+                };
+                let (low, high) = (corner(0), corner(1));
+                (0..mesh.points.len() as u32)
+                    .filter(|&i| {
+                        let x = mesh.points[i as usize];
+                        x.cmpge(low).all() && x.cmple(high).all()
+                    })
+                    .collect()
+            }
+        };
+        if points.is_empty() {
+            return Err(AppError::Body(format!(
+                "marker {} follows no point of the surface: make its box larger",
+                section.name
+            )));
+        }
+        Ok(Self {
+            name: section.name.clone(),
+            rest_m: mean(&points, &mesh.points),
+            points,
+        })
+    }
+}
+
+fn mean(indices: &[u32], points: &[Vec3]) -> Vec3 {
+    indices.iter().map(|&i| points[i as usize]).sum::<Vec3>() / indices.len() as f32
+}

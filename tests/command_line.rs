@@ -1,0 +1,237 @@
+//! The command line as scripts see it: exit status, files, messages. No test here needs a GPU.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn palpate(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args(arguments)
+        .output()
+        .expect("the binary runs")
+}
+
+/// A folder that is removed at the end of the test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("palpate-cli-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&path).expect("a temporary folder");
+        Self(path)
+    }
+
+    fn write(&self, name: &str, content: &[u8]) -> String {
+        let path = self.0.join(name);
+        std::fs::write(&path, content).expect("a temporary file");
+        path.display().to_string()
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.0.join(name).display().to_string()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Exit status 2 and one message that holds all of `words`.
+fn refused(arguments: &[&str], words: &[&str]) {
+    let output = palpate(arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(
+        output.status.code(),
+        Some(2),
+        "{arguments:?} ended with {:?}: {message}",
+        output.status
+    );
+    for word in words {
+        assert!(
+            message.contains(word),
+            "{arguments:?}: the message lacks {word:?}: {message}"
+        );
+    }
+    assert!(!message.contains("panicked"), "{arguments:?}: {message}");
+}
+
+/// Mean of a small simulation-only replay: its `summary.json`.
+fn replay(folder: &Folder, out: &str, more: &[&str]) -> serde_json::Value {
+    let out = folder.path(out);
+    let mut arguments = vec!["replay", "slab", "--no-render", "--frames", "40", "--out", &out];
+    arguments.extend_from_slice(more);
+    let output = palpate(&arguments);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let text = std::fs::read_to_string(Path::new(&out).join("summary.json")).expect("a summary");
+    serde_json::from_str(&text).expect("sound JSON")
+}
+
+#[test]
+fn a_replay_ends_in_the_same_bits_on_one_and_two_threads_and_twice_in_a_row() {
+    let folder = Folder::new("bits");
+    let one = replay(&folder, "one", &["--threads", "1"]);
+    let two = replay(&folder, "two", &["--threads", "2"]);
+    let again = replay(&folder, "again", &["--threads", "2"]);
+    assert_eq!(one["state_sha256"], two["state_sha256"]);
+    assert_eq!(two["state_sha256"], again["state_sha256"]);
+    let softer = replay(
+        &folder,
+        "softer",
+        &["--set", "solver.youngs_modulus_pa=3000"],
+    );
+    assert_ne!(
+        one["state_sha256"], softer["state_sha256"],
+        "a softer slab must end elsewhere, or the hash sees nothing"
+    );
+}
+
+#[test]
+fn a_summary_has_every_key_that_scripts_read() {
+    let folder = Folder::new("summary");
+    let summary = replay(&folder, "out", &[]);
+    for key in [
+        "scene",
+        "version",
+        "commit",
+        "adapter",
+        "threads",
+        "frames",
+        "timestep_s",
+        "size",
+        "mesh",
+        "frame_ms",
+        "sim_ms",
+        "passes",
+        "left_out",
+        "refit",
+        "state_sha256",
+        "finite",
+        "inverted_tets",
+        "volume_drift",
+        "speed_max_final_m_s",
+        "tool",
+        "markers",
+        "first_frame_s",
+    ] {
+        assert!(summary.get(key).is_some(), "no {key} in {summary}");
+    }
+    for key in ["p50", "p95", "p99", "max", "low1pct"] {
+        assert!(summary["frame_ms"][key].is_number(), "no frame_ms.{key}");
+    }
+    assert_eq!(summary["frames"], 40);
+    assert_eq!(summary["finite"], true);
+    for file in ["frames.csv", "trace.json", "states.bin", "states.json", "report.html"] {
+        assert!(
+            Path::new(&folder.path("out")).join(file).is_file(),
+            "no {file}"
+        );
+    }
+}
+
+#[test]
+fn a_pressed_slab_pushes_back_and_its_marker_sinks() {
+    let folder = Folder::new("slab");
+    let summary = replay(&folder, "out", &["--frames", "80"]);
+    let force = summary["tool"]["force_max_n"].as_f64().expect("a force");
+    assert!(force > 0.01, "{force} N");
+    let sunk = summary["markers"][0]["displacement_m"][1]
+        .as_f64()
+        .expect("a displacement");
+    assert!(sunk < -0.002, "the middle moved by {sunk} m");
+}
+
+#[test]
+fn a_replay_agrees_with_its_own_recording_and_not_with_another() {
+    let folder = Folder::new("against");
+    replay(&folder, "recorded", &[]);
+    let out = folder.path("again");
+    let recorded = folder.path("recorded");
+    let run = |more: &[&str]| {
+        let mut arguments = vec![
+            "replay", "slab", "--no-render", "--frames", "40", "--out", &out, "--against",
+            &recorded,
+        ];
+        arguments.extend_from_slice(more);
+        palpate(&arguments).status.code()
+    };
+    assert_eq!(run(&[]), Some(0));
+    assert_eq!(run(&["--set", "tool.0.radius_m=0.012"]), Some(1));
+}
+
+#[test]
+fn a_missing_scene_is_refused_with_the_bundled_ones_named() {
+    refused(&["replay", "lever"], &["lever", "liver"]);
+}
+
+#[test]
+fn a_misspelt_key_is_refused_with_the_known_ones_named() {
+    let folder = Folder::new("key");
+    let scene = folder.write(
+        "scene.toml",
+        b"[body]\nshape = \"slab\"\nextent_m = [0.1, 0.1, 0.1]\n\n[solver]\nsubstep = 3\n",
+    );
+    refused(&["check", &scene], &[&scene, "line 6", "substep", "substeps"]);
+    refused(
+        &["replay", "slab", "--no-render", "--set", "solver.substep=3"],
+        &["solver.substep", "substeps"],
+    );
+    refused(
+        &["replay", "slab", "--no-render", "--set", "solver.substeps=many"],
+        &["solver.substeps", "u32"],
+    );
+}
+
+#[test]
+fn values_out_of_range_are_refused_with_the_range() {
+    for (set, words) in [
+        ("solver.timestep_s=nan", ["timestep_s", "0.1"]),
+        ("solver.poisson_ratio=0.5", ["poisson_ratio", "0.499"]),
+        ("body.density_kg_m3=-1", ["density_kg_m3", "30000"]),
+        ("body.cell_m=0", ["cell_m", "10"]),
+        ("output.frames=0", ["output.frames", "1"]),
+    ] {
+        refused(&["replay", "slab", "--no-render", "--set", set], &words);
+    }
+}
+
+#[test]
+fn meshes_that_cant_be_used_are_refused_by_name() {
+    let folder = Folder::new("mesh");
+    let missing = folder.path("missing.glb");
+    refused(&["check", &missing], &["missing.glb"]);
+    let truncated = folder.write("truncated.glb", b"glTF\x02\0\0\0\xff\xff\xff\xff");
+    let flat = folder.write(
+        "flat.obj",
+        b"v 0 0 0\nv 0 0 0\nv 0 0 0\nv 0 0 0\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n",
+    );
+    for (file, name) in [(&truncated, "truncated.glb"), (&flat, "flat.obj")] {
+        let set = format!("body.file='{file}'");
+        refused(&["replay", "liver", "--no-render", "--set", &set], &[name]);
+    }
+}
+
+#[test]
+fn bad_usage_ends_with_status_two() {
+    refused(&["replay"], &["SCENE"]);
+    refused(&["replay", "slab", "--size", "huge"], &["WIDTHxHEIGHT"]);
+    refused(&["replay", "slab", "--frames", "10", "--dump", "11"], &["11", "10"]);
+    refused(&["juggle"], &["juggle"]);
+}
+
+#[test]
+fn every_bundled_scene_is_listed_and_sound() {
+    let output = palpate(&["scenes"]);
+    assert!(output.status.success());
+    let text = String::from_utf8_lossy(&output.stdout);
+    for name in ["liver", "liver-gooey", "heart", "slab"] {
+        assert!(
+            text.lines().any(|line| line.starts_with(name)),
+            "{name} is not listed: {text}"
+        );
+    }
+}
