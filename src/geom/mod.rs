@@ -3,6 +3,10 @@
 //! Nothing here knows of time, of the GPU or of scene files.
 
 pub mod ray;
+pub mod noise;
+pub mod organ;
+pub mod paint;
+pub mod unwrap;
 
 use glam::{Vec2, Vec3};
 

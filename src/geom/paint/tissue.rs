@@ -1,0 +1,105 @@
+//! What each tissue looks like at a place: colour, relief, depth of its layers.
+//!
+//! Colours are sRGB, chosen by eye after photographs of living organs: dark, brownish, wet; pattern
+//! sizes are those of anatomy (liver lobules 1 to 2 mm, fibre bundles below 1 mm). Colours are
+//! mixed as they are, in sRGB: powers need not have the same bits everywhere.
+
+mod heart;
+mod liver;
+
+use super::canvas::Canvas;
+use super::vessel::{Habit, Samples, Tree};
+use super::{Dab, Site, Tissue};
+use crate::geom::noise::{cellular, fractal, gradient, lerp, smoothstep};
+use glam::Vec3;
+
+/// Places from which vessels are grown.
+const SAMPLES: usize = 40_000;
+
+/// A tissue with the vessels of one surface.
+pub struct Brush {
+    tissue: Tissue,
+    /// Large vessels: veins in the depth of the liver, coronary arteries on the heart.
+    large: Tree,
+    /// Fine vessels in the outer layer.
+    fine: Tree,
+}
+
+impl Brush {
+    /// Grows the vessels of `tissue` over the surface on the canvas, along `guides` if there are
+    /// any.
+    pub fn new(tissue: Tissue, canvas: &Canvas, guides: &[Vec<Vec3>]) -> Self {
+        let samples = Samples::new(&canvas.places, &canvas.normals, &canvas.triangles, SAMPLES);
+        let (large, fine) = match tissue {
+            Tissue::Liver => (liver::LARGE, liver::FINE),
+            Tissue::Heart => (heart::LARGE, heart::FINE),
+        };
+        let roots;
+        let guides = if guides.is_empty() {
+            roots = own_roots(tissue, &samples);
+            &roots
+        } else {
+            guides
+        };
+        let fine_roots = scattered_roots(&samples, 9);
+        Self {
+            tissue,
+            large: Tree::grow(&samples, guides, &large),
+            fine: Tree::grow(&samples, &fine_roots, &fine),
+        }
+    }
+
+    /// What the tissue has at a place.
+    pub fn dab(&self, site: &Site) -> Dab {
+        let large = self.large.near(site.place);
+        let fine = self.fine.near(site.place);
+        let mut dab = match self.tissue {
+            Tissue::Liver => liver::dab(site, large, fine),
+            Tissue::Heart => heart::dab(site, large, fine),
+        };
+        // Rounding must keep the layers in order.
+        for k in 1..4 {
+            dab.depths[k] = dab.depths[k].clamp(dab.depths[k - 1], 1.0);
+        }
+        dab
+    }
+}
+
+/// Where vessels begin on a surface of unknown shape: in the middle of its back for the liver,
+/// near the top for the heart.
+fn own_roots(tissue: Tissue, samples: &Samples) -> Vec<Vec<Vec3>> {
+    let score = |sample: usize| match tissue {
+        Tissue::Liver => -samples.normals[sample].y - samples.normals[sample].z,
+        Tissue::Heart => samples.places[sample].y + 0.5 * samples.normals[sample].z,
+    };
+    (0..samples.places.len())
+        .max_by(|&a, &b| score(a).total_cmp(&score(b)))
+        .map(|sample| vec![samples.places[sample]])
+        .into_iter()
+        .collect()
+}
+
+/// `count` single places all over the surface.
+fn scattered_roots(samples: &Samples, count: usize) -> Vec<Vec<Vec3>> {
+    let total = samples.places.len();
+    (0..count)
+        .filter_map(|k| samples.places.get((2 * k + 1) * total / (2 * count)))
+        .map(|&place| vec![place])
+        .collect()
+}
+
+/// Colour from three bytes.
+const fn rgb(r: u8, g: u8, b: u8) -> Vec3 {
+    Vec3::new(r as f32 / 255.0, g as f32 / 255.0, b as f32 / 255.0)
+}
+
+/// Fat: lobules a few millimetres wide between thin seams. Gives colour and relief [cm].
+fn fat(place: Vec3) -> (Vec3, f32) {
+    let bent = place + 0.12 * Vec3::splat(gradient(place / 0.5, 31));
+    let lobules = cellular(bent / 0.32, 32);
+    let seam = smoothstep(0.0, 0.22, lobules.second - lobules.nearest);
+    let shade = 0.5 + 0.5 * fractal(place / 0.8, 2, 33) + 0.25 * (lobules.shade - 0.5);
+    let colour = rgb(176, 118, 58).lerp(rgb(214, 172, 102), shade.clamp(0.0, 1.0));
+    let colour = rgb(150, 74, 44).lerp(colour, lerp(0.55, 1.0, seam));
+    (colour, 0.035 * seam * (1.0 - 0.5 * lobules.nearest))
+}
