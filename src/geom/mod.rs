@@ -2,6 +2,9 @@
 //!
 //! Nothing here knows of time, of the GPU or of scene files.
 
+pub mod export;
+pub mod import;
+
 use glam::{Vec2, Vec3};
 
 /// A closed triangle surface with texture coordinates.
