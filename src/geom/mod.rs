@@ -7,6 +7,8 @@ pub mod noise;
 pub mod organ;
 pub mod paint;
 pub mod unwrap;
+pub mod export;
+pub mod import;
 
 use glam::{Vec2, Vec3};
 
