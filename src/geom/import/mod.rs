@@ -22,7 +22,7 @@ mod weld;
 pub use describe::describe;
 pub use error::{ImportError, ImportFault};
 pub use part::{FileParts, Part, TextureSource, read_parts};
-pub use surface::{ImportOptions, ImportedSurface, read_surface};
+pub use surface::{ImportOptions, ImportedSurface, read_surface, read_surface_bytes};
 pub use uv::{UvState, uv_state};
 
 #[cfg(test)]

@@ -83,17 +83,20 @@ impl Room {
 ///
 /// [`ImportError`] names the place in the file: see [`ImportFault`].
 pub fn read_parts(path: &Path) -> Result<FileParts, ImportError> {
-    read_parts_inner(path).map_err(|fault| fault.of(path))
+    read_bytes(path)
+        .and_then(|bytes| parts_of(path, &bytes))
+        .map_err(|fault| fault.of(path))
 }
 
-fn read_parts_inner(path: &Path) -> Result<FileParts, ImportFault> {
+/// As [`read_parts`] for `bytes` that are at hand; `path` gives the ending and the folder of other files.
+pub(super) fn parts_of(path: &Path, bytes: &[u8]) -> Result<FileParts, ImportFault> {
     let ending = path.extension().and_then(|ending| ending.to_str());
     let read = match ending.map(str::to_ascii_lowercase).as_deref() {
         Some("glb" | "gltf") => gltf::read,
         Some("obj") => obj::read,
         _ => return Err(ImportFault::Ending),
     };
-    let mut file = read(&read_bytes(path)?, path)?;
+    let mut file = read(bytes, path)?;
     for part in &file.parts {
         check_positions(part)?;
     }

@@ -2,7 +2,7 @@
 
 use super::closure::closing_selections;
 use super::error::{ImportError, ImportFault};
-use super::part::{Part, TextureSource, read_parts};
+use super::part::{FileParts, Part, TextureSource, parts_of, read_parts};
 use super::repair::{Repair, repair, split_touching_points};
 use super::topology::{defects, flips, pieces};
 use super::uv::{UvState, triangles_without_uv_area, uv_state};
@@ -55,10 +55,30 @@ pub struct ImportedSurface {
 /// [`ImportError`] if the file cannot be read, names an unknown mesh or holds nothing that closes.
 pub fn read_surface(path: &Path, options: &ImportOptions) -> Result<ImportedSurface, ImportError> {
     let file = read_parts(path)?;
-    let surface = select(file.parts, options)
-        .and_then(|parts| close_parts(&parts, file.notes))
-        .map_err(|fault| fault.of(path))?;
-    Ok(surface)
+    closed_surface(file, options).map_err(|fault| fault.of(path))
+}
+
+/// As [`read_surface`] for the `bytes` of a file that is inside the binary; `path` is its name.
+///
+/// # Errors
+///
+/// As [`read_surface`].
+pub fn read_surface_bytes(
+    path: &Path,
+    bytes: &[u8],
+    options: &ImportOptions,
+) -> Result<ImportedSurface, ImportError> {
+    parts_of(path, bytes)
+        .and_then(|file| closed_surface(file, options))
+        .map_err(|fault| fault.of(path))
+}
+
+fn closed_surface(
+    file: FileParts,
+    options: &ImportOptions,
+) -> Result<ImportedSurface, ImportFault> {
+    let parts = select(file.parts, options)?;
+    close_parts(&parts, file.notes)
 }
 
 /// The parts whose name is asked for.
