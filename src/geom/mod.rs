@@ -2,6 +2,11 @@
 //!
 //! Nothing here knows of time, of the GPU or of scene files.
 
+pub mod moments;
+pub mod patch;
+pub mod plane;
+pub mod tangent;
+
 use glam::{Vec2, Vec3};
 
 /// A closed triangle surface with texture coordinates.
