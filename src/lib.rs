@@ -13,3 +13,4 @@
 
 pub mod geom;
 pub mod gpu;
+pub mod passes;

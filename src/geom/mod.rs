@@ -9,6 +9,10 @@ pub mod paint;
 pub mod unwrap;
 pub mod export;
 pub mod import;
+pub mod moments;
+pub mod patch;
+pub mod plane;
+pub mod tangent;
 
 use glam::{Vec2, Vec3};
 

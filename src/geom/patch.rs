@@ -1,0 +1,293 @@
+//! Patches: the points near each point at rest, as lists of bit masks.
+//!
+//! Points are sorted into *slots* so that 32 neighbouring ones share a *leaf*, and a patch says
+//! which slots of which leaves belong to it. A patch of 200 points meets about 20 leaves: 160 bytes
+//! in place of 800, and "which of them have moved" is 20 and-operations in place of 200 look-ups.
+
+use glam::Vec3;
+use rayon::prelude::*;
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
+
+/// Slots of a leaf: the bits of a mask.
+pub const LEAF_SLOTS: usize = 32;
+/// Points every patch has, if the surface has them: below about 7 a plane follows single points.
+pub const MEMBERS_MIN: usize = 16;
+
+/// The members of a patch in one leaf: bit i stands for slot `32 leaf + i`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Block {
+    /// Which 32 slots.
+    pub leaf: u32,
+    /// Which of them.
+    pub members: u32,
+}
+
+impl Block {
+    /// Slots of this block, in order.
+    pub fn slots(self) -> impl Iterator<Item = usize> {
+        let first = self.leaf as usize * LEAF_SLOTS;
+        (0..LEAF_SLOTS)
+            .filter(move |bit| self.members >> bit & 1 == 1)
+            .map(move |bit| first + bit)
+    }
+}
+
+/// Block lists, one after another (CSR): those of `i` stand at `start[i]..start[i + 1]`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BlockLists {
+    /// Where each list starts, and the end.
+    pub start: Vec<u32>,
+    /// The lists, each sorted by leaf.
+    pub blocks: Vec<Block>,
+}
+
+impl BlockLists {
+    fn join(lists: &[Vec<Block>]) -> Self {
+        let mut start = Vec::with_capacity(lists.len() + 1);
+        start.push(0);
+        for list in lists {
+            start.push(start[start.len() - 1] + list.len() as u32);
+        }
+        Self {
+            start,
+            blocks: lists.concat(),
+        }
+    }
+
+    /// The blocks of list `index`.
+    pub fn of(&self, index: usize) -> &[Block] {
+        &self.blocks[self.start[index] as usize..self.start[index + 1] as usize]
+    }
+}
+
+/// The patch of every point. Membership is symmetric, and every point is in its own patch.
+#[derive(Clone, Debug)]
+pub struct Patches {
+    /// The point in each slot.
+    pub order: Vec<u32>,
+    /// The slot of each point.
+    pub slot_of: Vec<u32>,
+    /// The patch of the point in each slot.
+    pub lists: BlockLists,
+}
+
+impl Patches {
+    /// Points within `radius_m` whose normals are not opposed (`n_i · n_j > 0`), and at least the
+    /// 16 nearest such points where the radius holds fewer.
+    ///
+    /// The list is made for the surface at rest and kept while it deforms. Without the look at the
+    /// normals a thin lobe would be fitted through both its sides.
+    ///
+    /// # Panics
+    ///
+    /// If `points` and `normals` differ in length.
+    pub fn new(points: &[Vec3], normals: &[Vec3], radius_m: f32) -> Self {
+        assert_eq!(points.len(), normals.len(), "one normal a point");
+        let order = spatial_order(points);
+        let mut slot_of = vec![0; points.len()];
+        for (slot, &point) in order.iter().enumerate() {
+            slot_of[point as usize] = slot as u32;
+        }
+        let sorted: Vec<Site> = order
+            .iter()
+            .map(|&point| Site {
+                position: points[point as usize],
+                normal: normals[point as usize],
+            })
+            .collect();
+        let mut lists = within_radius(&sorted, radius_m.max(0.0));
+        fill_small_patches(&sorted, &mut lists);
+        Self {
+            order,
+            slot_of,
+            lists: BlockLists::join(&lists),
+        }
+    }
+
+    /// Points of the patch of `point`, itself included.
+    pub fn members(&self, point: usize) -> impl Iterator<Item = usize> + '_ {
+        self.lists
+            .of(self.slot_of[point] as usize)
+            .iter()
+            .flat_map(|block| block.slots())
+            .map(|slot| self.order[slot] as usize)
+    }
+
+    /// Points in the patch of `slot`.
+    pub fn member_count(&self, slot: usize) -> u32 {
+        let blocks = self.lists.of(slot).iter();
+        blocks.map(|block| block.members.count_ones()).sum()
+    }
+
+    /// Leaves, the last of which may be partly filled.
+    pub fn leaf_count(&self) -> usize {
+        self.order.len().div_ceil(LEAF_SLOTS)
+    }
+
+    /// The patches that any point of a leaf is in, leaf by leaf.
+    pub fn patches_of_leaves(&self) -> BlockLists {
+        let leaves: Vec<Vec<Block>> = (0..self.leaf_count())
+            .map(|leaf| {
+                let mut union = vec![0_u32; self.leaf_count()];
+                let first = leaf * LEAF_SLOTS;
+                for slot in first..(first + LEAF_SLOTS).min(self.order.len()) {
+                    for block in self.lists.of(slot) {
+                        union[block.leaf as usize] |= block.members;
+                    }
+                }
+                blocks_of_masks(&union)
+            })
+            .collect();
+        BlockLists::join(&leaves)
+    }
+}
+
+/// The distance beyond which light of extinction `extinction_per_m` has lost all but `epsilon` of
+/// itself: `r = -ln ε / σ_t` [m]. Source: François 2006, section 4.
+pub fn radius_from_extinction_m(extinction_per_m: f32, epsilon: f32) -> f32 {
+    -epsilon.ln() / extinction_per_m
+}
+
+#[derive(Clone, Copy)]
+struct Site {
+    position: Vec3,
+    normal: Vec3,
+}
+
+impl Site {
+    fn faces(&self, other: &Self) -> bool {
+        self.normal.dot(other.normal) > 0.0
+    }
+}
+
+/// Points sorted so that each run of 32 is compact: halved along the longest side of their box
+/// until 32 are left.
+fn spatial_order(points: &[Vec3]) -> Vec<u32> {
+    fn halve(points: &[Vec3], order: &mut [u32]) {
+        if order.len() <= LEAF_SLOTS {
+            order.sort_unstable();
+            return;
+        }
+        let places = || order.iter().map(|&point| points[point as usize]);
+        let low = places().fold(Vec3::INFINITY, Vec3::min);
+        let high = places().fold(Vec3::NEG_INFINITY, Vec3::max);
+        let axis = (high - low).max_position();
+        let half = (order.len() / 2).next_multiple_of(LEAF_SLOTS);
+        order.select_nth_unstable_by(half, |&a, &b| {
+            points[a as usize][axis]
+                .total_cmp(&points[b as usize][axis])
+                .then(a.cmp(&b))
+        });
+        let (left, right) = order.split_at_mut(half);
+        halve(points, left);
+        halve(points, right);
+    }
+    let mut order: Vec<u32> = (0..points.len() as u32).collect();
+    halve(points, &mut order);
+    order
+}
+
+fn within_radius(sorted: &[Site], radius_m: f32) -> Vec<Vec<Block>> {
+    let radius_squared = radius_m * radius_m;
+    let boxes: Vec<(Vec3, Vec3)> = sorted
+        .chunks(LEAF_SLOTS)
+        .map(|leaf| {
+            let places = || leaf.iter().map(|site| site.position);
+            (
+                places().fold(Vec3::INFINITY, Vec3::min),
+                places().fold(Vec3::NEG_INFINITY, Vec3::max),
+            )
+        })
+        .collect();
+    // A hair more than the radius, so that rounding in the box test loses no member.
+    let reach_squared = radius_squared * 1.0001;
+    let near = |a: &(Vec3, Vec3), b: &(Vec3, Vec3)| {
+        let gap = (b.0 - a.1).max(a.0 - b.1).max(Vec3::ZERO);
+        gap.length_squared() <= reach_squared
+    };
+    sorted
+        .par_chunks(LEAF_SLOTS)
+        .zip(&boxes)
+        .flat_map_iter(|(leaf, leaf_box)| {
+            let others: Vec<usize> = (0..boxes.len())
+                .filter(|&other| near(leaf_box, &boxes[other]))
+                .collect();
+            let radius_test = move |site: &Site, other: &Site| {
+                site.position.distance_squared(other.position) <= radius_squared
+                    && site.faces(other)
+            };
+            leaf.iter().map(move |site| {
+                others
+                    .iter()
+                    .map(|&other| {
+                        let first = other * LEAF_SLOTS;
+                        let slots = &sorted[first..(first + LEAF_SLOTS).min(sorted.len())];
+                        let members = slots
+                            .iter()
+                            .enumerate()
+                            .filter(|(_, s)| std::ptr::eq(*s, site) || radius_test(site, s))
+                            .fold(0, |mask, (bit, _)| mask | 1 << bit);
+                        Block {
+                            leaf: other as u32,
+                            members,
+                        }
+                    })
+                    .filter(|block| block.members != 0)
+                    .collect::<Vec<_>>()
+            })
+        })
+        .collect()
+}
+
+/// Gives every patch of fewer than 16 points its nearest, and them it.
+fn fill_small_patches(sorted: &[Site], lists: &mut [Vec<Block>]) {
+    let small: Vec<usize> = (0..lists.len())
+        .filter(|&slot| {
+            let members: u32 = lists[slot].iter().map(|b| b.members.count_ones()).sum();
+            (members as usize) < MEMBERS_MIN
+        })
+        .collect();
+    if small.is_empty() {
+        return;
+    }
+    let tree = RTree::bulk_load(
+        sorted
+            .iter()
+            .enumerate()
+            .map(|(slot, site)| GeomWithData::new(site.position.to_array(), slot))
+            .collect(),
+    );
+    let pairs: Vec<(usize, usize)> = small
+        .into_par_iter()
+        .flat_map_iter(|slot| {
+            tree.nearest_neighbor_iter(sorted[slot].position.to_array())
+                .map(|found| found.data)
+                .filter(move |&other| sorted[slot].faces(&sorted[other]))
+                .take(MEMBERS_MIN)
+                .map(move |other| (slot, other))
+        })
+        .collect();
+    for (slot, other) in pairs {
+        add_member(&mut lists[slot], other);
+        add_member(&mut lists[other], slot);
+    }
+}
+
+fn add_member(list: &mut Vec<Block>, slot: usize) {
+    let leaf = (slot / LEAF_SLOTS) as u32;
+    let bit = 1 << (slot % LEAF_SLOTS);
+    match list.binary_search_by_key(&leaf, |block| block.leaf) {
+        Ok(at) => list[at].members |= bit,
+        Err(at) => list.insert(at, Block { leaf, members: bit }),
+    }
+}
+
+fn blocks_of_masks(masks: &[u32]) -> Vec<Block> {
+    (0_u32..)
+        .zip(masks)
+        .filter(|&(_, &members)| members != 0)
+        .map(|(leaf, &members)| Block { leaf, members })
+        .collect()
+}

@@ -1,0 +1,255 @@
+//! The plane that stands for the surface near a point, where light is followed to its entry.
+//!
+//! A primitive is a unit normal `n` and a signed offset `h`: the plane `{ x : n · (x - P) = h }`,
+//! with P the point as it lies now. The offset is negative where the surface bulges outwards.
+//!
+//! Source: François et al., "Subsurface Texture Mapping", INRIA 2006, section 4 (least-squares
+//! planes) and eq. 14, whose unsigned offset loses the side; ours keeps it.
+
+use super::patch::Patches;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// How the light-path planes follow the deforming surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LightPathMethod {
+    /// The tangent plane; nothing is fitted.
+    Tangent,
+    /// Planes fitted at rest and left as they were, anchored at the moved point.
+    Stale,
+    /// Planes fitted at rest and turned with the tangent frame.
+    Carried,
+    /// Planes fitted anew at every point in every frame.
+    Full,
+    /// Planes fitted anew where something moved.
+    Incremental,
+}
+
+impl LightPathMethod {
+    /// Every method, cheapest first.
+    pub const ALL: [Self; 5] = [
+        Self::Tangent,
+        Self::Stale,
+        Self::Carried,
+        Self::Incremental,
+        Self::Full,
+    ];
+
+    /// As scene files and charts call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tangent => "tangent",
+            Self::Stale => "stale",
+            Self::Carried => "carried",
+            Self::Full => "full",
+            Self::Incremental => "incremental",
+        }
+    }
+}
+
+/// The plane `{ x : normal · (x - P) = offset_m }` near a point P.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// Unit vector to the outside.
+    pub normal: Vec3,
+    /// Signed distance of the plane from P along the normal [m].
+    pub offset_m: f32,
+}
+
+impl Plane {
+    /// The tangent plane at a point with this normal.
+    pub fn tangent(normal: Vec3) -> Self {
+        Self {
+            normal,
+            offset_m: 0.0,
+        }
+    }
+
+    /// As the shaders read it.
+    pub fn to_array(self) -> [f32; 4] {
+        let n = self.normal;
+        [n.x, n.y, n.z, self.offset_m]
+    }
+}
+
+/// Second moments of a patch about its mean, `Σ d dᵀ / N`, in any unit: xx, yy, zz and xy, xz, yz.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    /// xx, yy, zz
+    pub squares: Vec3,
+    /// xy, xz, yz
+    pub products: Vec3,
+}
+
+/// Sweeps of Jacobi's method. Three turn what a f32 can show of the off-diagonal to zero; the fourth
+/// is room. The same in `plane_fit.wgsl`.
+const JACOBI_SWEEPS: usize = 4;
+/// The two smaller eigenvalues must differ by this share of the largest for a plane to be told; the
+/// same in `plane_fit.wgsl`. At the edge, rounding of f32 turns the normal by 0.01 degrees.
+const MIN_EIGENVALUE_GAP: f32 = 1e-3;
+/// Traces below this are those of a single place; the same in `plane_fit.wgsl`.
+const MIN_TRACE: f32 = 1e-30;
+
+/// The direction in which a patch is thinnest: the eigenvector of the smallest eigenvalue.
+///
+/// `None` where there is no such direction: all points at one place, on one line, or spread alike
+/// across it.
+///
+/// Cyclic Jacobi rotations on the spread divided by its trace. Twin of `thinnest_direction` in
+/// `shaders/plane_fit.wgsl`. Source: Golub and Van Loan, "Matrix Computations", 8.5.
+pub fn thinnest_direction(spread: Spread) -> Option<Vec3> {
+    let trace = spread.squares.x + spread.squares.y + spread.squares.z;
+    // Written so that a trace that is no number has no direction either.
+    if !(trace > MIN_TRACE && trace.is_finite()) {
+        return None;
+    }
+    let [mut a, mut b, mut c] = (spread.squares / trace).to_array();
+    let [mut ab, mut ac, mut bc] = (spread.products / trace).to_array();
+    let (mut va, mut vb, mut vc) = (Vec3::X, Vec3::Y, Vec3::Z);
+    for _ in 0..3 * JACOBI_SWEEPS {
+        // Turn a and b until ab is 0, then rename (a, b, c) to (b, c, a).
+        let difference = b - a;
+        let size = difference.abs() + (difference * difference + 4.0 * ab * ab).sqrt();
+        let side = if difference < 0.0 { -1.0 } else { 1.0 };
+        let t = if size > MIN_TRACE {
+            2.0 * side * ab / size
+        } else {
+            0.0
+        };
+        let cosine = 1.0 / (1.0 + t * t).sqrt();
+        let sine = t * cosine;
+        let (old_ac, old_bc, old_va, old_vb) = (ac, bc, va, vb);
+        let (a_turned, b_turned) = (a - t * ab, b + t * ab);
+        let turned_ac = cosine * old_ac - sine * old_bc;
+        let turned_bc = sine * old_ac + cosine * old_bc;
+        let a_axis = cosine * old_va - sine * old_vb;
+        let b_axis = sine * old_va + cosine * old_vb;
+        (a, b, c) = (b_turned, c, a_turned);
+        (ab, ac, bc) = (turned_bc, 0.0, turned_ac);
+        (va, vb, vc) = (b_axis, vc, a_axis);
+    }
+    let (mut least, mut direction) = (a, va);
+    if b < least {
+        (least, direction) = (b, vb);
+    }
+    if c < least {
+        (least, direction) = (c, vc);
+    }
+    let largest = a.max(b).max(c);
+    let middle = a + b + c - least - largest;
+    (middle - least > MIN_EIGENVALUE_GAP * largest).then(|| direction.normalize())
+}
+
+/// The plane of a patch whose mean lies at `mean_m` from P, facing the way of `normal`.
+///
+/// The tangent plane where the patch has no thinnest direction. Twin of `plane_of_moments` in
+/// `shaders/plane_fit.wgsl`.
+pub fn plane_of_moments(mean_m: Vec3, spread: Spread, normal: Vec3) -> Plane {
+    let Some(direction) = thinnest_direction(spread) else {
+        return Plane::tangent(normal);
+    };
+    let outward = if direction.dot(normal) < 0.0 {
+        -direction
+    } else {
+        direction
+    };
+    Plane {
+        normal: outward,
+        offset_m: outward.dot(mean_m),
+    }
+}
+
+/// Least-squares plane through `members` [m], seen from the point `at` [m] with unit normal `normal`.
+///
+/// The tangent plane for fewer than three members or where they have no thinnest direction.
+///
+/// Twin of `shaders/plane_full.wgsl`.
+pub fn fit_plane(members: impl Iterator<Item = Vec3>, at: Vec3, normal: Vec3) -> Plane {
+    let mut count = 0.0;
+    let mut sum = Vec3::ZERO;
+    let mut squares = Vec3::ZERO;
+    let mut products = Vec3::ZERO;
+    for member in members {
+        let d = member - at;
+        count += 1.0;
+        sum += d;
+        squares += d * d;
+        products += Vec3::new(d.x * d.y, d.x * d.z, d.y * d.z);
+    }
+    if count < 3.0 {
+        return Plane::tangent(normal);
+    }
+    let mean = sum / count;
+    let spread = Spread {
+        squares: squares / count - mean * mean,
+        products: products / count - Vec3::new(mean.x * mean.y, mean.x * mean.z, mean.y * mean.z),
+    };
+    plane_of_moments(mean, spread, normal)
+}
+
+/// [`fit_plane`] for the patch of every point.
+pub fn fit_planes(points: &[Vec3], normals: &[Vec3], patches: &Patches) -> Vec<Plane> {
+    (0..points.len())
+        .into_par_iter()
+        .map(|point| {
+            let members = patches.members(point).map(|member| points[member]);
+            fit_plane(members, points[point], normals[point])
+        })
+        .collect()
+}
+
+/// A plane `carried` by the tangent frame of its point: its normal in (tangent, bitangent, normal).
+///
+/// Twin of `shaders/plane_carried.wgsl`.
+pub fn carried_plane(carried: Plane, tangent: Vec3, handedness: f32, normal: Vec3) -> Plane {
+    let local = carried.normal;
+    let bitangent = handedness * normal.cross(tangent);
+    Plane {
+        normal: (local.x * tangent + local.y * bitangent + local.z * normal).normalize(),
+        offset_m: carried.offset_m,
+    }
+}
+
+/// `plane` with its normal written in the tangent frame of its point, for [`carried_plane`].
+pub fn plane_in_frame(plane: Plane, tangent: Vec3, handedness: f32, normal: Vec3) -> Plane {
+    let bitangent = handedness * normal.cross(tangent);
+    Plane {
+        normal: Vec3::new(
+            plane.normal.dot(tangent),
+            plane.normal.dot(bitangent),
+            plane.normal.dot(normal),
+        ),
+        offset_m: plane.offset_m,
+    }
+}
+
+/// The plane in f64: two passes over the members and a full eigen-decomposition. The oracle.
+///
+/// Normal and offset [m]; `None` for fewer than three members.
+pub fn exact_plane(
+    members: impl Iterator<Item = DVec3> + Clone,
+    at: DVec3,
+    normal: DVec3,
+) -> Option<(DVec3, f64)> {
+    let count = members.clone().count();
+    if count < 3 {
+        return None;
+    }
+    let mean = members.clone().sum::<DVec3>() / count as f64;
+    let mut spread = nalgebra::Matrix3::<f64>::zeros();
+    for member in members {
+        let d = nalgebra::Vector3::from((member - mean).to_array());
+        spread += d * d.transpose();
+    }
+    let eigen = spread.symmetric_eigen();
+    let column = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+    let direction = DVec3::new(column[0], column[1], column[2]).normalize();
+    let outward = if direction.dot(normal) < 0.0 {
+        -direction
+    } else {
+        direction
+    };
+    Some((outward, outward.dot(mean - at)))
+}

@@ -1,0 +1,135 @@
+//! The light-path primitive of the scene: one of a closed set of methods.
+
+use super::mesh_buffers::MeshBuffers;
+use super::plane_carried::PlaneCarried;
+use super::plane_full::PlaneFull;
+use super::plane_incremental::PlaneIncremental;
+use super::tangents::Tangents;
+use crate::geom::SurfaceMesh;
+use crate::geom::patch::Patches;
+use crate::geom::plane::{LightPathMethod, Plane, fit_planes};
+use crate::geom::tangent::{Fans, rest_normals};
+use crate::gpu::{Gpu, GpuError, Timer, storage};
+
+/// How much of a frame's planes had to be made anew.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RefitCounts {
+    /// Planes fitted in the frame.
+    pub refitted: u32,
+    /// Points that moved by more than the tolerance.
+    pub moved: u32,
+}
+
+/// The passes that bring the light-path planes up to date.
+pub enum LightPath {
+    /// Nothing: the surface shader takes the tangent plane.
+    Tangent,
+    /// The planes at rest, uploaded once.
+    Stale(wgpu::Buffer),
+    /// The planes at rest, turned.
+    Carried(PlaneCarried),
+    /// All planes anew.
+    Full(PlaneFull),
+    /// The planes near moved points anew.
+    Incremental(PlaneIncremental),
+}
+
+impl LightPath {
+    /// Builds what `method` needs and nothing else.
+    ///
+    /// `radius_m` is the reach of a patch at rest; a point counts as moved when it lies farther than
+    /// `tolerance_m` from where its patches last saw it (only `incremental` asks).
+    ///
+    /// # Errors
+    ///
+    /// [`GpuError::BufferTooLarge`] if the patches of this radius are longer than the adapter binds,
+    /// and those of the kernels.
+    pub fn new(
+        gpu: &Gpu,
+        method: LightPathMethod,
+        radius_m: f32,
+        tolerance_m: f32,
+        mesh: &SurfaceMesh,
+        buffers: &MeshBuffers,
+        tangents: &Tangents,
+    ) -> Result<Self, GpuError> {
+        if method == LightPathMethod::Tangent {
+            return Ok(Self::Tangent);
+        }
+        let normals = rest_normals(mesh, &Fans::new(mesh));
+        let patches = Patches::new(&mesh.points, &normals, radius_m);
+        Ok(match method {
+            LightPathMethod::Tangent => Self::Tangent,
+            LightPathMethod::Stale => {
+                let planes: Vec<[f32; 4]> = fit_planes(&mesh.points, &normals, &patches)
+                    .into_iter()
+                    .map(Plane::to_array)
+                    .collect();
+                Self::Stale(storage(gpu, "planes", &planes)?)
+            }
+            LightPathMethod::Carried => {
+                let planes = fit_planes(&mesh.points, &normals, &patches);
+                Self::Carried(PlaneCarried::new(gpu, mesh, &planes, &normals, tangents)?)
+            }
+            LightPathMethod::Full => Self::Full(PlaneFull::new(gpu, &patches, buffers, tangents)?),
+            LightPathMethod::Incremental => Self::Incremental(PlaneIncremental::new(
+                gpu,
+                tolerance_m,
+                &mesh.points,
+                &normals,
+                &patches,
+                buffers,
+                tangents,
+            )?),
+        })
+    }
+
+    /// Adds this frame's passes to `encoder`, after the tangents.
+    pub fn record(&self, encoder: &mut wgpu::CommandEncoder, timer: &mut Timer) {
+        match self {
+            Self::Tangent | Self::Stale(_) => {}
+            Self::Carried(pass) => pass.record(encoder, timer),
+            Self::Full(pass) => pass.record(encoder, timer),
+            Self::Incremental(pass) => pass.record(encoder, timer),
+        }
+    }
+
+    /// Unit normal and signed offset [m] of each point's plane, `[vec4f; points]`; `None` where the
+    /// tangent plane is meant.
+    pub fn planes(&self) -> Option<&wgpu::Buffer> {
+        match self {
+            Self::Tangent => None,
+            Self::Stale(planes) => Some(planes),
+            Self::Carried(pass) => Some(&pass.planes),
+            Self::Full(pass) => Some(&pass.planes),
+            Self::Incremental(pass) => Some(&pass.planes),
+        }
+    }
+
+    /// Names of the passes it records, as the timer knows them.
+    pub fn pass_names(&self) -> &'static [&'static str] {
+        match self {
+            Self::Tangent | Self::Stale(_) => &[],
+            Self::Carried(_) => &[PlaneCarried::NAME],
+            Self::Full(_) => &[PlaneFull::NAME],
+            Self::Incremental(_) => &[PlaneIncremental::NAME],
+        }
+    }
+
+    /// What the last submitted frame fitted, waited for. Only `incremental` has to ask the GPU;
+    /// `full` fits all points and looks at none.
+    ///
+    /// # Errors
+    ///
+    /// [`GpuError::ReadBack`] if the counts can't be read.
+    pub fn counts(&self, gpu: &Gpu) -> Result<RefitCounts, GpuError> {
+        match self {
+            Self::Tangent | Self::Stale(_) | Self::Carried(_) => Ok(RefitCounts::default()),
+            Self::Full(pass) => Ok(RefitCounts {
+                refitted: pass.point_count,
+                moved: pass.point_count,
+            }),
+            Self::Incremental(pass) => pass.counts(gpu),
+        }
+    }
+}
