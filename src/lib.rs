@@ -14,3 +14,4 @@
 pub mod geom;
 pub mod gpu;
 pub mod passes;
+pub mod sim;

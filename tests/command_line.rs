@@ -59,7 +59,15 @@ fn refused(arguments: &[&str], words: &[&str]) {
 /// Mean of a small simulation-only replay: its `summary.json`.
 fn replay(folder: &Folder, out: &str, more: &[&str]) -> serde_json::Value {
     let out = folder.path(out);
-    let mut arguments = vec!["replay", "slab", "--no-render", "--frames", "40", "--out", &out];
+    let mut arguments = vec![
+        "replay",
+        "slab",
+        "--no-render",
+        "--frames",
+        "40",
+        "--out",
+        &out,
+    ];
     arguments.extend_from_slice(more);
     let output = palpate(&arguments);
     assert!(
@@ -125,7 +133,13 @@ fn a_summary_has_every_key_that_scripts_read() {
     }
     assert_eq!(summary["frames"], 40);
     assert_eq!(summary["finite"], true);
-    for file in ["frames.csv", "trace.json", "states.bin", "states.json", "report.html"] {
+    for file in [
+        "frames.csv",
+        "trace.json",
+        "states.bin",
+        "states.json",
+        "report.html",
+    ] {
         assert!(
             Path::new(&folder.path("out")).join(file).is_file(),
             "no {file}"
@@ -153,7 +167,14 @@ fn a_replay_agrees_with_its_own_recording_and_not_with_another() {
     let recorded = folder.path("recorded");
     let run = |more: &[&str]| {
         let mut arguments = vec![
-            "replay", "slab", "--no-render", "--frames", "40", "--out", &out, "--against",
+            "replay",
+            "slab",
+            "--no-render",
+            "--frames",
+            "40",
+            "--out",
+            &out,
+            "--against",
             &recorded,
         ];
         arguments.extend_from_slice(more);
@@ -175,13 +196,22 @@ fn a_misspelt_key_is_refused_with_the_known_ones_named() {
         "scene.toml",
         b"[body]\nshape = \"slab\"\nextent_m = [0.1, 0.1, 0.1]\n\n[solver]\nsubstep = 3\n",
     );
-    refused(&["check", &scene], &[&scene, "line 6", "substep", "substeps"]);
+    refused(
+        &["check", &scene],
+        &[&scene, "line 6", "substep", "substeps"],
+    );
     refused(
         &["replay", "slab", "--no-render", "--set", "solver.substep=3"],
         &["solver.substep", "substeps"],
     );
     refused(
-        &["replay", "slab", "--no-render", "--set", "solver.substeps=many"],
+        &[
+            "replay",
+            "slab",
+            "--no-render",
+            "--set",
+            "solver.substeps=many",
+        ],
         &["solver.substeps", "u32"],
     );
 }
@@ -219,7 +249,10 @@ fn meshes_that_cant_be_used_are_refused_by_name() {
 fn bad_usage_ends_with_status_two() {
     refused(&["replay"], &["SCENE"]);
     refused(&["replay", "slab", "--size", "huge"], &["WIDTHxHEIGHT"]);
-    refused(&["replay", "slab", "--frames", "10", "--dump", "11"], &["11", "10"]);
+    refused(
+        &["replay", "slab", "--frames", "10", "--dump", "11"],
+        &["11", "10"],
+    );
     refused(&["juggle"], &["juggle"]);
 }
 

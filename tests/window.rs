@@ -29,7 +29,11 @@ impl Desk {
     fn new(name: &str, number: u32) -> Option<Self> {
         for program in ["Xvfb", "xdotool"] {
             if Command::new(program)
-                .arg(if program == "Xvfb" { "-help" } else { "version" })
+                .arg(if program == "Xvfb" {
+                    "-help"
+                } else {
+                    "version"
+                })
                 .stdout(Stdio::null())
                 .stderr(Stdio::null())
                 .status()
@@ -57,7 +61,9 @@ impl Desk {
             folder,
             _server: Guard(server),
         };
-        desk.wait_for("the X server", || desk.try_tool(&["getmouselocation"]).is_some());
+        desk.wait_for("the X server", || {
+            desk.try_tool(&["getmouselocation"]).is_some()
+        });
         Some(desk)
     }
 
@@ -179,7 +185,9 @@ fn a_mouse_push_moves_the_organ_is_answered_by_a_force_and_changes_the_picture()
 
     let force = column(&log, "tool_force_n").into_iter().fold(0.0, f32::max);
     assert!(force > 0.01, "the organ pushed back with {force} N only");
-    let speed = column(&log, "speed_max_m_s").into_iter().fold(0.0, f32::max);
+    let speed = column(&log, "speed_max_m_s")
+        .into_iter()
+        .fold(0.0, f32::max);
     assert!(speed > 1e-3, "nothing moved faster than {speed} m/s");
     let noise = changed_share(&at_rest, &still);
     let change = changed_share(&at_rest, &pushed);

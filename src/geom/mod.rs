@@ -2,17 +2,18 @@
 //!
 //! Nothing here knows of time, of the GPU or of scene files.
 
-pub mod ray;
+pub mod export;
+pub mod import;
+pub mod lattice;
+pub mod moments;
 pub mod noise;
 pub mod organ;
 pub mod paint;
-pub mod unwrap;
-pub mod export;
-pub mod import;
-pub mod moments;
 pub mod patch;
 pub mod plane;
+pub mod ray;
 pub mod tangent;
+pub mod unwrap;
 
 use glam::{Vec2, Vec3};
 

@@ -256,9 +256,8 @@ mod tests {
                 .iter()
                 .flat_map(|t| {
                     let p = t.map(|p| points[p as usize]);
-                    (0..3).map(move |k| {
-                        (p[(k + 1) % 3] - p[k]).angle_between(p[(k + 2) % 3] - p[k])
-                    })
+                    (0..3)
+                        .map(move |k| (p[(k + 1) % 3] - p[k]).angle_between(p[(k + 2) % 3] - p[k]))
                 })
                 .fold(f32::MAX, f32::min)
                 .to_degrees()

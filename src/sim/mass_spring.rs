@@ -1,0 +1,150 @@
+//! Springs along the edges of the mesh, semi-implicit Euler: the baseline of every chart.
+//!
+//! A spring of stiffness k = E Σ V / L² (V: the tetrahedra round the edge) makes, on average over
+//! directions, a body of Young's modulus E and Poisson's ratio 1/4: the energy of springs in all
+//! directions is E/5 (2 ε:ε + tr² ε), that of a body with λ = μ = 2E/5.
+//!
+//! Source of the stiffness: Van Gelder, "Approximate Simulation of Elastic Membranes by
+//! Triangulated Spring Meshes", JGT 3, 1998; the average is derived here.
+
+use crate::geom::TetMesh;
+use glam::{Vec3, Vec4};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// An edge of the mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct Edge {
+    pub particles: [u32; 2],
+    pub rest_length_m: f32,
+    /// Stiffness over modulus, Σ V / L² [m].
+    pub stiffness_per_modulus_m: f32,
+}
+
+/// All edges of the tetrahedra `sound`, ordered by their particles.
+pub fn edges_of(mesh: &TetMesh, sound: &[u32], fill: &[f32]) -> Vec<Edge> {
+    let mut volumes: BTreeMap<[u32; 2], f64> = BTreeMap::new();
+    for &tet in sound {
+        let volume = super::diagnose::rest_volume_m3(mesh, tet as usize);
+        let [a, b, c, d] = mesh.tets[tet as usize];
+        for [i, j] in [[a, b], [a, c], [a, d], [b, c], [b, d], [c, d]] {
+            let share = volumes.entry([i.min(j), i.max(j)]).or_default();
+            *share += volume * f64::from(fill[tet as usize]);
+        }
+    }
+    volumes
+        .into_iter()
+        .map(|(particles, volume)| {
+            let [a, b] = particles.map(|i| mesh.particles[i as usize].as_dvec3());
+            Edge {
+                particles,
+                rest_length_m: a.distance(b) as f32,
+                stiffness_per_modulus_m: (volume / a.distance_squared(b)) as f32,
+            }
+        })
+        .collect()
+}
+
+/// A spring as seen from one of its ends.
+#[derive(Clone, Copy, Debug)]
+struct Spring {
+    other: u32,
+    rest_length_m: f32,
+    stiffness_per_modulus_m: f32,
+}
+
+/// All springs of a body, gathered at each particle: every sum has one order, whoever computes it.
+#[derive(Clone, Debug)]
+pub struct MassSpring {
+    springs: Vec<Spring>,
+    /// Where the springs of each particle start; one more at the end.
+    starts: Vec<u32>,
+    accelerations: Vec<Vec3>,
+}
+
+/// Particles a task.
+const PARTICLES_PER_TASK: usize = 1024;
+
+impl MassSpring {
+    /// Springs along the edges of the tetrahedra `sound` of `mesh`, of which `fill` is tissue.
+    pub fn new(mesh: &TetMesh, sound: &[u32], fill: &[f32]) -> Self {
+        let mut at = vec![Vec::new(); mesh.particles.len()];
+        for edge in edges_of(mesh, sound, fill) {
+            let [a, b] = edge.particles;
+            for (end, other) in [(a, b), (b, a)] {
+                at[end as usize].push(Spring {
+                    other,
+                    rest_length_m: edge.rest_length_m,
+                    stiffness_per_modulus_m: edge.stiffness_per_modulus_m,
+                });
+            }
+        }
+        let mut starts = vec![0];
+        for springs in &at {
+            starts.push(starts[starts.len() - 1] + springs.len() as u32);
+        }
+        Self {
+            springs: at.concat(),
+            starts,
+            accelerations: vec![Vec3::ZERO; mesh.particles.len()],
+        }
+    }
+
+    /// Acceleration of each particle [m/s²] by its springs, of Young's modulus `modulus_pa`.
+    pub fn accelerations(&mut self, particles: &[Vec4], modulus_pa: f32) -> &[Vec3] {
+        let (springs, starts) = (&self.springs, &self.starts);
+        let at = |index: usize| {
+            let here = particles[index];
+            let mut force = Vec3::ZERO;
+            for spring in &springs[starts[index] as usize..starts[index + 1] as usize] {
+                let edge = particles[spring.other as usize].truncate() - here.truncate();
+                let length = edge.length();
+                // Coincident particles have no direction to be pushed apart in.
+                if length > super::constraint::LENGTH_MIN_M {
+                    let stretch = (length - spring.rest_length_m) / length;
+                    force += edge * (modulus_pa * spring.stiffness_per_modulus_m * stretch);
+                }
+            }
+            here.w * force
+        };
+        let run = |(task, out): (usize, &mut [Vec3])| {
+            for (offset, acceleration) in out.iter_mut().enumerate() {
+                *acceleration = at(task * PARTICLES_PER_TASK + offset);
+            }
+        };
+        if self.accelerations.len() >= 2 * PARTICLES_PER_TASK && rayon::current_num_threads() > 1 {
+            (self
+                .accelerations
+                .par_chunks_mut(PARTICLES_PER_TASK)
+                .enumerate())
+            .for_each(run);
+        } else {
+            (self
+                .accelerations
+                .chunks_mut(PARTICLES_PER_TASK)
+                .enumerate())
+            .for_each(run);
+        }
+        &self.accelerations
+    }
+
+    /// A substep [s] that is sure to be stable, 2/ω: by Gershgorin's bound ω² ≤ max 2 w Σ k. The
+    /// true edge is higher by up to √3, since springs pull along their own direction only.
+    pub fn stable_substep_s(&self, particles: &[Vec4], modulus_pa: f32) -> f32 {
+        let highest = (0..self.starts.len() - 1)
+            .map(|i| {
+                let own = &self.springs[self.starts[i] as usize..self.starts[i + 1] as usize];
+                // Mass-scaled rows: w_i Σ k + Σ √(w_i w_j) k, at most the row's own part plus what
+                // the lighter end makes of it.
+                own.iter()
+                    .map(|spring| {
+                        let k = modulus_pa * spring.stiffness_per_modulus_m;
+                        let (wi, wj) = (particles[i].w, particles[spring.other as usize].w);
+                        k * (wi + (wi * wj).sqrt())
+                    })
+                    .sum::<f32>()
+            })
+            .fold(0.0, f32::max);
+        2.0 / highest.sqrt()
+    }
+}

@@ -1,0 +1,243 @@
+//! The body in time: a tetrahedral mesh that is pulled, pushed and left alone. No GPU, no clock.
+//!
+//! [`Simulation`] owns the state; [`Simulation::step`] advances it by one fixed time step under
+//! rigid tools. Everything is in SI units, and the same inputs give the same bits on any number of
+//! threads.
+
+mod coloring;
+pub mod constraint;
+mod contact;
+pub mod diagnose;
+mod grab;
+mod lanes;
+mod mass_spring;
+mod model;
+mod neo_hookean;
+mod particles;
+mod simulation;
+mod springs;
+mod tools;
+
+pub use simulation::Simulation;
+
+use crate::geom::{Embedding, TetMesh};
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+/// How the body resists deformation, and how that is solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Springs along the edges, semi-implicit Euler. The classic; Poisson's ratio is 1/4 whatever
+    /// is asked for, and too long a substep explodes.
+    MassSpring,
+    /// Compliant edge lengths and tetrahedron volumes, XPBD.
+    XpbdSprings,
+    /// Stable neo-Hookean tetrahedra, shape and volume solved together, XPBD.
+    XpbdNeoHookean,
+}
+
+/// Method, material and time step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolverParams {
+    pub method: Method,
+    /// Time one call of [`Simulation::step`] advances [s].
+    pub timestep_s: f32,
+    /// Substeps a step.
+    pub substeps: u32,
+    /// Sweeps over all constraints a substep; more substeps are nearly always the better buy.
+    pub iterations: u32,
+    /// Young's modulus E [Pa].
+    pub youngs_modulus_pa: f32,
+    /// Poisson's ratio ν.
+    pub poisson_ratio: f32,
+}
+
+impl Default for SolverParams {
+    fn default() -> Self {
+        Self {
+            method: Method::XpbdNeoHookean,
+            timestep_s: 1.0 / 60.0,
+            substeps: 20,
+            iterations: 1,
+            youngs_modulus_pa: 5e3,
+            poisson_ratio: 0.45,
+        }
+    }
+}
+
+/// Lamé's two moduli.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lame {
+    /// Shear modulus μ [Pa].
+    pub mu_pa: f32,
+    /// First modulus λ [Pa].
+    pub lambda_pa: f32,
+}
+
+impl SolverParams {
+    /// What is wrong with these values, with the allowed range; `None` if they can be used.
+    pub fn problem(&self) -> Option<String> {
+        let checks = [
+            ("timestep_s", self.timestep_s, 1e-5, 0.1),
+            ("substeps", self.substeps as f32, 1.0, 10_000.0),
+            ("iterations", self.iterations as f32, 1.0, 1_000.0),
+            ("youngs_modulus_pa", self.youngs_modulus_pa, 1.0, 1e9),
+            ("poisson_ratio", self.poisson_ratio, 0.0, 0.499),
+        ];
+        out_of_range(&checks)
+    }
+
+    /// Lamé's moduli of the material.
+    pub fn lame(&self) -> Lame {
+        let (e, nu) = (self.youngs_modulus_pa, self.poisson_ratio);
+        Lame {
+            mu_pa: e / (2.0 * (1.0 + nu)),
+            lambda_pa: e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)),
+        }
+    }
+
+    /// Length of a substep [s].
+    pub fn substep_s(&self) -> f32 {
+        self.timestep_s / self.substeps as f32
+    }
+}
+
+/// What acts on the whole body.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BodyParams {
+    /// Acceleration of every particle [m/s²].
+    pub gravity_m_s2: Vec3,
+    /// Velocities are multiplied by exp(−damping · time step) once a step [1/s].
+    pub damping_per_s: f32,
+}
+
+impl Default for BodyParams {
+    fn default() -> Self {
+        Self {
+            gravity_m_s2: Vec3::new(0.0, -9.81, 0.0),
+            damping_per_s: 2.0,
+        }
+    }
+}
+
+impl BodyParams {
+    /// What is wrong with these values, with the allowed range; `None` if they can be used.
+    pub fn problem(&self) -> Option<String> {
+        let [x, y, z] = self.gravity_m_s2.to_array();
+        out_of_range(&[
+            ("gravity_m_s2", x, -1e4, 1e4),
+            ("gravity_m_s2", y, -1e4, 1e4),
+            ("gravity_m_s2", z, -1e4, 1e4),
+            ("damping_per_s", self.damping_per_s, 0.0, 1e4),
+        ])
+    }
+}
+
+/// The first value that is outside its range, in words.
+fn out_of_range(checks: &[(&str, f32, f32, f32)]) -> Option<String> {
+    checks
+        .iter()
+        // Written so that NaN is out of range too.
+        .find(|(_, value, low, high)| !(*low <= *value && *value <= *high))
+        .map(|(name, value, low, high)| {
+            format!("{name} = {value} is out of range: choose from {low} to {high}")
+        })
+}
+
+/// A body at rest, as the simulation takes it over.
+#[derive(Clone, Debug, Default)]
+pub struct BodySetup {
+    /// Particles [m] and tetrahedra; flat and inverted ones are left out of the elastic model.
+    pub tets: TetMesh,
+    /// Mass of each particle [kg], all positive.
+    pub masses_kg: Vec<f32>,
+    /// Particles that are held in place; one flag each.
+    pub fixed: Vec<bool>,
+    /// Share of each tetrahedron that is tissue, scaling its stiffness: `Lattice::fill`, or 1 for a
+    /// mesh that is all tissue.
+    pub fill: Vec<f32>,
+    /// Surface points at rest [m].
+    pub rest_points: Vec<Vec3>,
+    /// Triangles of the surface; corners are points.
+    pub point_triangles: Vec<[u32; 3]>,
+    /// Where each surface point hangs.
+    pub embedding: Embedding,
+    /// What acts on the whole body from the start.
+    pub params: BodyParams,
+}
+
+/// Shape of a rigid tool.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ToolShape {
+    /// About the tool's position.
+    Sphere { radius_m: f32 },
+    /// Round the segment from the tool's position (the tip) to position + `axis` [m].
+    Capsule { radius_m: f32, axis: Vec3 },
+}
+
+impl ToolShape {
+    /// Radius [m].
+    pub fn radius_m(self) -> f32 {
+        match self {
+            Self::Sphere { radius_m } | Self::Capsule { radius_m, .. } => radius_m,
+        }
+    }
+
+    /// From the tool's position to the other end of its axis [m]; zero for a sphere.
+    pub fn axis(self) -> Vec3 {
+        match self {
+            Self::Sphere { .. } => Vec3::ZERO,
+            Self::Capsule { axis, .. } => axis,
+        }
+    }
+}
+
+/// What a tool does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ToolAction {
+    /// Touches nothing.
+    #[default]
+    Idle,
+    /// Is solid.
+    Push,
+    /// Holds the surface points that it reached when it closed.
+    Grab,
+}
+
+/// One tool during one step. Tools are told apart by their place in the list.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ToolInput {
+    pub shape: ToolShape,
+    /// Where it is at the end of the step [m]; it comes in a straight line from where it was.
+    pub position_m: Vec3,
+    pub action: ToolAction,
+    /// Coulomb friction coefficient.
+    pub friction: f32,
+}
+
+/// What a step did.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StepReport {
+    /// RMS over all constraints of C + α̃λ after the last substep. Constraints are made free of
+    /// units by their rest length or volume; 0 for a method without constraints.
+    pub residual_rms: f32,
+    /// (volume − rest volume) / rest volume, over all tetrahedra.
+    pub volume_drift: f32,
+    /// Force of the body on each tool [N], mean over the step, in the order of the inputs.
+    pub tool_forces_n: Vec<Vec3>,
+    /// Deepest surface point inside a pushing tool at the end of the step [m].
+    pub penetration_max_m: f32,
+    /// Tetrahedra of negative volume that were positive at rest.
+    pub inverted_tets: usize,
+    /// Particles frozen so far because their state was no longer finite.
+    pub frozen_particles: usize,
+    /// Fastest particle at the end of the step [m/s].
+    pub speed_max_m_s: f32,
+    /// Nothing moved and nothing was computed.
+    pub asleep: bool,
+}

@@ -1,0 +1,150 @@
+//! The state of the particles, and handles by which a place between them is moved.
+
+use crate::geom::Embedding;
+use glam::{Vec3, Vec4};
+use rayon::prelude::*;
+
+/// Positions, velocities and inverse masses of a body.
+#[derive(Clone, Debug)]
+pub struct Particles {
+    /// Position [m] and inverse mass [1/kg] of each particle, and one place that no particle owns
+    /// (see `lanes::Corners`).
+    pub places: Vec<Vec4>,
+    /// Where each was when the substep started.
+    pub previous: Vec<Vec4>,
+    /// Velocities [m/s].
+    pub velocities: Vec<Vec3>,
+    /// Where each was when the step started: the last state known to be finite.
+    finite: Vec<Vec4>,
+}
+
+/// Particles a task; fewer are not worth another thread.
+const PARTICLES_PER_TASK: usize = 4096;
+
+impl Particles {
+    /// Particles at `rest`, still.
+    pub fn new(rest: &[Vec3], inverse_masses: &[f32]) -> Self {
+        let mut places: Vec<Vec4> = (rest.iter().zip(inverse_masses))
+            .map(|(&x, &w)| x.extend(w))
+            .collect();
+        places.push(Vec4::ZERO);
+        Self {
+            previous: places.clone(),
+            finite: places.clone(),
+            velocities: vec![Vec3::ZERO; rest.len()],
+            places,
+        }
+    }
+
+    /// Remembers this state as the last finite one.
+    pub fn keep_finite(&mut self) {
+        self.finite.copy_from_slice(&self.places);
+    }
+
+    /// Moves every free particle by its velocity, after gravity and `accelerations` (one each, or
+    /// none at all) have changed that.
+    pub fn predict(&mut self, gravity_m_s2: Vec3, accelerations: Option<&[Vec3]>, substep_s: f32) {
+        let count = self.velocities.len();
+        self.places
+            .par_chunks_mut(PARTICLES_PER_TASK)
+            .zip(self.previous.par_chunks_mut(PARTICLES_PER_TASK))
+            .zip(self.velocities.par_chunks_mut(PARTICLES_PER_TASK))
+            .with_min_len(1 + (2 * PARTICLES_PER_TASK).saturating_sub(count))
+            .enumerate()
+            .for_each(|(task, ((places, previous), velocities))| {
+                for (offset, velocity) in velocities.iter_mut().enumerate() {
+                    let place = &mut places[offset];
+                    previous[offset] = *place;
+                    if place.w > 0.0 {
+                        let own = accelerations
+                            .map_or(Vec3::ZERO, |a| a[task * PARTICLES_PER_TASK + offset]);
+                        *velocity += substep_s * (gravity_m_s2 + own);
+                        *place += (substep_s * *velocity).extend(0.0);
+                    }
+                }
+            });
+    }
+
+    /// Velocities from what the substep did to the positions.
+    pub fn update_velocities(&mut self, substep_s: f32) {
+        let per_s = 1.0 / substep_s;
+        let count = self.velocities.len();
+        self.velocities
+            .par_iter_mut()
+            .zip(&self.places)
+            .zip(&self.previous)
+            .with_min_len((2 * PARTICLES_PER_TASK).min(count + 1))
+            .for_each(|((velocity, place), previous)| {
+                *velocity = per_s * (place.truncate() - previous.truncate());
+            });
+    }
+
+    /// Rolls every particle that is not finite back to where the step found it and holds it there.
+    /// Returns how many there were.
+    pub fn freeze_if_not_finite(&mut self) -> usize {
+        let mut frozen = 0;
+        for (index, velocity) in self.velocities.iter_mut().enumerate() {
+            if !(self.places[index].is_finite() && velocity.is_finite()) {
+                self.places[index] = self.finite[index].truncate().extend(0.0);
+                *velocity = Vec3::ZERO;
+                frozen += 1;
+            }
+        }
+        frozen
+    }
+
+    /// Fastest particle [m/s].
+    pub fn speed_max_m_s(&self) -> f32 {
+        self.velocities
+            .iter()
+            .map(|v| v.length_squared())
+            .fold(0.0, f32::max)
+            .sqrt()
+    }
+}
+
+/// Four particles that carry a place, and what they are worth together.
+#[derive(Clone, Copy, Debug)]
+pub struct Handle {
+    particles: [u32; 4],
+    weights: [f32; 4],
+    /// Σ weight² · inverse mass [1/kg]; 0 if none of the four can move.
+    pub inverse_mass: f32,
+}
+
+impl Handle {
+    /// The handle at surface point `point`.
+    pub fn of_point(embedding: &Embedding, point: usize, places: &[Vec4]) -> Self {
+        let (particles, weights) = (embedding.particles[point], embedding.weights[point]);
+        let inverse_mass = (0..4)
+            .map(|k| weights[k] * weights[k] * places[particles[k] as usize].w)
+            .sum();
+        Self {
+            particles,
+            weights,
+            inverse_mass,
+        }
+    }
+
+    /// Where the place is now [m].
+    pub fn place(&self, places: &[Vec4]) -> Vec3 {
+        (0..4)
+            .map(|k| self.weights[k] * places[self.particles[k] as usize].truncate())
+            .sum()
+    }
+
+    /// Moves the particles as an impulse times the substep, `multiplier` [kg m], at the place.
+    pub fn push(&self, places: &mut [Vec4], multiplier: Vec3) {
+        for k in 0..4 {
+            let particle = &mut places[self.particles[k] as usize];
+            *particle += (particle.w * self.weights[k] * multiplier).extend(0.0);
+        }
+    }
+
+    /// The particles that carry the place, each with a weight other than 0.
+    pub fn carriers(&self) -> impl Iterator<Item = u32> {
+        (0..4)
+            .filter(|&k| self.weights[k] != 0.0)
+            .map(|k| self.particles[k])
+    }
+}

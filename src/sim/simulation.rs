@@ -1,0 +1,397 @@
+//! The body's state and one step of it.
+
+use super::{
+    BodyParams, BodySetup, SolverParams, StepReport, ToolInput,
+    diagnose::{rest_volume_m3, volume_and_inverted},
+    grab::Tissue,
+    model::Model,
+    particles::Particles,
+    tools::{Met, Tools},
+};
+use crate::geom::bounds;
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// A body slower than this many of its sizes a second is calm.
+const CALM_SIZES_PER_S: f32 = 5e-4;
+/// So many calm steps in a row put it to sleep: half a second, longer than it hangs still at the
+/// turning point of a swing.
+const CALM_STEPS: u32 = 30;
+/// Points a task, in bringing the surface up to date.
+const POINTS_PER_TASK: usize = 4096;
+
+/// A soft body in time.
+#[derive(Debug)]
+pub struct Simulation {
+    setup: BodySetup,
+    solver: SolverParams,
+    body: BodyParams,
+    /// Tetrahedra with a positive volume at rest; the others have no model.
+    sound: Vec<u32>,
+    sound_tets: Vec<[u32; 4]>,
+    rest_volume_m3: f64,
+    size_m: f32,
+    density_kg_m3: f32,
+    edge_m: f32,
+
+    model: Model,
+    particles: Particles,
+    tools: Tools,
+    /// Positions, as they are given out [m].
+    positions: Vec<Vec3>,
+    points: Vec<Vec3>,
+    point_bounds: (Vec3, Vec3),
+    report: StepReport,
+    calm_steps: u32,
+    frozen: usize,
+    pool: Option<rayon::ThreadPool>,
+}
+
+impl Simulation {
+    /// A body at rest.
+    ///
+    /// # Panics
+    ///
+    /// If the lists of `setup` do not fit each other, a mass is not positive, or a parameter is out
+    /// of range (see [`SolverParams::problem`] and [`BodyParams::problem`]).
+    pub fn new(setup: BodySetup, params: SolverParams) -> Self {
+        check(&setup);
+        assert_usable(params.problem());
+        assert_usable(setup.params.problem());
+        let mesh = &setup.tets;
+        let sound: Vec<u32> = (0..mesh.tets.len() as u32)
+            .filter(|&tet| is_sound(&setup, tet as usize))
+            .collect();
+        let sound_tets: Vec<[u32; 4]> = sound.iter().map(|&tet| mesh.tets[tet as usize]).collect();
+        let (low, high) = bounds(&mesh.particles);
+        let tissue_m3: f64 = sound
+            .iter()
+            .map(|&tet| rest_volume_m3(mesh, tet as usize) * f64::from(setup.fill[tet as usize]))
+            .sum();
+        let mass_kg: f64 = setup.masses_kg.iter().map(|&mass| f64::from(mass)).sum();
+        let rest_volume_m3 = volume_and_inverted(&mesh.particles, &sound_tets).0;
+        // The edge of a regular tetrahedron of the mean volume.
+        let mean_volume = rest_volume_m3 / sound.len().max(1) as f64;
+        let mut simulation = Self {
+            model: Model::new(params.method, mesh, &sound, &setup.fill),
+            particles: Particles::new(&mesh.particles, &inverse_masses(&setup)),
+            tools: Tools::default(),
+            positions: mesh.particles.clone(),
+            points: setup.rest_points.clone(),
+            point_bounds: (Vec3::ZERO, Vec3::ZERO),
+            report: StepReport::default(),
+            calm_steps: 0,
+            frozen: 0,
+            pool: None,
+            size_m: (high - low).max_element(),
+            density_kg_m3: (mass_kg / tissue_m3.max(f64::MIN_POSITIVE)) as f32,
+            edge_m: (mean_volume * 72.0_f64.sqrt()).cbrt() as f32,
+            rest_volume_m3,
+            sound,
+            sound_tets,
+            solver: params,
+            body: setup.params,
+            setup,
+        };
+        simulation.publish();
+        simulation
+    }
+
+    /// Advances the body by one time step while the tools move to where `tools` has them.
+    pub fn step(&mut self, tools: &[ToolInput]) -> StepReport {
+        match self.pool.take() {
+            Some(pool) => {
+                pool.install(|| self.advance(tools));
+                self.pool = Some(pool);
+            }
+            None => self.advance(tools),
+        }
+        self.report.clone()
+    }
+
+    /// Uses this many threads, or rayon's global pool again for `None`. The bits do not change.
+    ///
+    /// # Panics
+    ///
+    /// If the system refuses the threads.
+    pub fn set_threads(&mut self, threads: Option<usize>) {
+        self.pool = threads.map(|count| {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(count)
+                .build()
+                .expect("the system gives the threads asked for")
+        });
+    }
+
+    /// Changes method, material or time step from the next step on; wakes the body.
+    ///
+    /// # Panics
+    ///
+    /// If a value is out of range (see [`SolverParams::problem`]).
+    pub fn set_params(&mut self, params: SolverParams) {
+        assert_usable(params.problem());
+        if params == self.solver {
+            return;
+        }
+        if params.method != self.solver.method {
+            let (mesh, fill) = (&self.setup.tets, &self.setup.fill);
+            self.model = Model::new(params.method, mesh, &self.sound, fill);
+        }
+        self.solver = params;
+        self.wake();
+    }
+
+    /// Changes gravity or damping from the next step on; wakes the body.
+    ///
+    /// # Panics
+    ///
+    /// If a value is out of range (see [`BodyParams::problem`]).
+    pub fn set_body_params(&mut self, params: BodyParams) {
+        assert_usable(params.problem());
+        if params != self.body {
+            self.body = params;
+            self.wake();
+        }
+    }
+
+    /// Puts the body back to rest where it was made, tools forgotten, frozen particles free again.
+    /// Parameters stay as they are.
+    pub fn reset(&mut self) {
+        self.particles = Particles::new(&self.setup.tets.particles, &inverse_masses(&self.setup));
+        self.tools = Tools::default();
+        self.frozen = 0;
+        self.report = StepReport::default();
+        self.wake();
+        self.publish();
+    }
+
+    /// Puts every free particle to `positions` [m] with `velocities` [m/s]; wakes the body.
+    ///
+    /// # Panics
+    ///
+    /// If there is not one of each a particle, or one is not finite.
+    pub fn set_state(&mut self, positions: &[Vec3], velocities: &[Vec3]) {
+        let count = self.positions.len();
+        assert!(
+            positions.len() == count && velocities.len() == count,
+            "one position and one velocity a particle"
+        );
+        for i in 0..count {
+            assert!(
+                positions[i].is_finite() && velocities[i].is_finite(),
+                "a state is finite"
+            );
+            let inverse_mass = self.particles.places[i].w;
+            if inverse_mass > 0.0 {
+                self.particles.places[i] = positions[i].extend(inverse_mass);
+                self.particles.velocities[i] = velocities[i];
+            }
+        }
+        self.wake();
+        self.publish();
+    }
+
+    /// Particle positions [m].
+    pub fn particles(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// Particle velocities [m/s].
+    pub fn velocities(&self) -> &[Vec3] {
+        &self.particles.velocities
+    }
+
+    /// Surface points [m].
+    pub fn points(&self) -> &[Vec3] {
+        &self.points
+    }
+
+    /// The body as it was made.
+    pub fn setup(&self) -> &BodySetup {
+        &self.setup
+    }
+
+    /// Method, material and time step.
+    pub fn params(&self) -> SolverParams {
+        self.solver
+    }
+
+    /// Gravity and damping.
+    pub fn body_params(&self) -> BodyParams {
+        self.body
+    }
+
+    /// What the last step did.
+    pub fn report(&self) -> &StepReport {
+        &self.report
+    }
+
+    /// Tetrahedra that take part: those with a positive volume at rest.
+    pub fn sound_tets(&self) -> &[u32] {
+        &self.sound
+    }
+
+    /// A substep [s] below which `mass-spring` is sure to be stable; `None` for the other methods,
+    /// which have no such edge.
+    pub fn stable_substep_s(&self) -> Option<f32> {
+        match &self.model {
+            Model::MassSpring(model) => {
+                Some(model.stable_substep_s(&self.particles.places, self.solver.youngs_modulus_pa))
+            }
+            Model::Springs(_) | Model::NeoHookean(_) => None,
+        }
+    }
+
+    fn wake(&mut self) {
+        self.calm_steps = 0;
+        self.report.asleep = false;
+    }
+
+    fn advance(&mut self, inputs: &[ToolInput]) {
+        let speed_m_s = self.particles.speed_max_m_s();
+        self.tools.begin_step(
+            inputs,
+            Met {
+                points: &self.points,
+                bounds: self.point_bounds,
+                embedding: &self.setup.embedding,
+                particles: &self.particles,
+                tissue: Tissue {
+                    youngs_modulus_pa: self.solver.youngs_modulus_pa,
+                    density_kg_m3: self.density_kg_m3,
+                    edge_m: self.edge_m,
+                },
+                size_m: self.size_m,
+                way_m: 2.0 * speed_m_s * self.solver.timestep_s,
+            },
+        );
+        let touched = self.tools.touches(&self.points);
+        if self.report.asleep && !touched {
+            self.report.tool_forces_n = vec![Vec3::ZERO; inputs.len()];
+            return;
+        }
+
+        self.particles.keep_finite();
+        for substep in 0..self.solver.substeps {
+            self.substep(substep);
+        }
+        let damping = (-self.body.damping_per_s * self.solver.timestep_s).exp();
+        for velocity in &mut self.particles.velocities {
+            *velocity *= damping;
+        }
+        self.frozen += self.particles.freeze_if_not_finite();
+
+        let residual_rms = (self.model).residual_rms(&mut self.particles.places, &self.solver);
+        self.publish();
+        let (volume, inverted_tets) = volume_and_inverted(&self.positions, &self.sound_tets);
+        let speed_max_m_s = self.particles.speed_max_m_s();
+        let calm = !touched && speed_max_m_s < CALM_SIZES_PER_S * self.size_m;
+        self.calm_steps = if calm { self.calm_steps + 1 } else { 0 };
+        self.report = StepReport {
+            residual_rms,
+            volume_drift: (volume / self.rest_volume_m3 - 1.0) as f32,
+            tool_forces_n: self.tools.forces_n(self.solver.substeps),
+            penetration_max_m: self.tools.penetration_max_m(&self.points),
+            inverted_tets,
+            frozen_particles: self.frozen,
+            speed_max_m_s,
+            asleep: false,
+        };
+        if self.calm_steps >= CALM_STEPS {
+            self.particles.velocities.fill(Vec3::ZERO);
+            self.report.asleep = true;
+            self.report.speed_max_m_s = 0.0;
+        }
+    }
+
+    /// Predict, constraints by colour, tools, velocities.
+    fn substep(&mut self, substep: u32) {
+        let substep_s = self.solver.substep_s();
+        let share = |k: u32| k as f32 / self.solver.substeps as f32;
+        let (from, to) = (share(substep), share(substep + 1));
+        let accelerations = (self.model).accelerations(&self.particles.places, &self.solver);
+        self.particles
+            .predict(self.body.gravity_m_s2, accelerations, substep_s);
+        self.model.begin_substep();
+        self.tools.begin_substep();
+        for _ in 0..self.solver.iterations {
+            (self.model).project(&mut self.particles.places, &self.solver);
+            self.tools.solve(&mut self.particles, from, to, substep_s);
+        }
+        self.tools.end_substep(substep_s);
+        self.particles.update_velocities(substep_s);
+    }
+
+    /// Copies the state to where others read it, and brings the surface up to date.
+    fn publish(&mut self) {
+        for (position, place) in self.positions.iter_mut().zip(&self.particles.places) {
+            *position = place.truncate();
+        }
+        let (embedding, positions) = (&self.setup.embedding, &self.positions);
+        self.points
+            .par_iter_mut()
+            .enumerate()
+            .with_min_len(POINTS_PER_TASK)
+            .for_each(|(i, point)| {
+                let (tet, weights) = (embedding.particles[i], embedding.weights[i]);
+                *point = (0..4)
+                    .map(|k| weights[k] * positions[tet[k] as usize])
+                    .sum();
+            });
+        self.point_bounds = bounds(&self.points);
+    }
+}
+
+fn assert_usable(problem: Option<String>) {
+    if let Some(problem) = problem {
+        panic!("parameters are checked before they come here: {problem}");
+    }
+}
+
+/// Panics where the lists of a setup do not fit each other.
+fn check(setup: &BodySetup) {
+    let count = setup.tets.particles.len();
+    assert!(
+        setup.masses_kg.len() == count && setup.fixed.len() == count,
+        "one mass and one flag a particle"
+    );
+    assert!(
+        setup.masses_kg.iter().all(|&m| m.is_finite() && m > 0.0),
+        "every particle has a mass"
+    );
+    assert!(
+        setup.fill.len() == setup.tets.tets.len() && setup.fill.iter().all(|&fill| fill > 0.0),
+        "one share of tissue a tetrahedron, none 0"
+    );
+    let points = setup.rest_points.len();
+    assert!(
+        setup.embedding.particles.len() == points && setup.embedding.weights.len() == points,
+        "one place in the tetrahedra a surface point"
+    );
+    assert!(
+        (setup.tets.tets.iter().chain(&setup.embedding.particles))
+            .flatten()
+            .all(|&particle| (particle as usize) < count),
+        "every corner is a particle"
+    );
+}
+
+/// Whether a tetrahedron has a volume to speak of: more than rounding of its longest edge.
+fn is_sound(setup: &BodySetup, tet: usize) -> bool {
+    let [a, b, c, d] = setup.tets.tets[tet].map(|particle| setup.tets.particles[particle as usize]);
+    let longest = [b - a, c - a, d - a, c - b, d - b, d - c]
+        .iter()
+        .map(|edge| edge.length())
+        .fold(0.0, f32::max);
+    rest_volume_m3(&setup.tets, tet) > 1e-6 * f64::from(longest).powi(3)
+}
+
+/// Inverse masses [1/kg], 0 where a particle is held.
+fn inverse_masses(setup: &BodySetup) -> Vec<f32> {
+    (setup.masses_kg.iter().zip(&setup.fixed))
+        .map(|(&mass, &fixed)| if fixed { 0.0 } else { 1.0 / mass })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;
