@@ -14,4 +14,5 @@
 pub mod geom;
 pub mod gpu;
 pub mod passes;
+pub mod scene;
 pub mod sim;

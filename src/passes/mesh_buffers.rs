@@ -56,6 +56,14 @@ impl MeshBuffers {
     }
 }
 
+impl MeshBuffers {
+    /// Draws every triangle with the pipeline that `pass` has set.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
+        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..self.index_count, 0, 0..1);
+    }
+}
+
 fn places(points: &[Vec3]) -> Vec<[f32; 4]> {
     points.iter().map(|p| [p.x, p.y, p.z, 1.0]).collect()
 }

@@ -1,0 +1,166 @@
+//! What render passes share: a pipeline with one bind group, made from a list of bindings.
+
+use crate::gpu::{Binding, Gpu, GpuError, Wgsl, bind, compile};
+
+/// A render pipeline and what it binds. Immutable once made.
+pub struct Draw {
+    pipeline: wgpu::RenderPipeline,
+    bindings: wgpu::BindGroup,
+}
+
+/// What kind of pipeline a [`Draw`] is.
+pub struct DrawKind<'a> {
+    /// Name of the pass, for errors and labels.
+    pub pass: &'static str,
+    /// The WGSL files, in order.
+    pub parts: &'a [Wgsl],
+    /// Their joined text, or a changed copy.
+    pub source: &'a str,
+    /// Vertex entry point.
+    pub vertex: &'a str,
+    /// Fragment entry point and the format it draws to; none for depth alone.
+    pub fragment: Option<(&'a str, wgpu::TextureFormat)>,
+    /// Format of the depth target, if there is one.
+    pub depth: Option<wgpu::TextureFormat>,
+    /// Which side of a triangle is not drawn.
+    pub cull: Option<wgpu::Face>,
+    /// Values of the `override`s.
+    pub constants: &'a [(&'a str, f64)],
+}
+
+impl Draw {
+    /// Compiles the pipeline and binds `bindings` as group 0.
+    ///
+    /// # Errors
+    ///
+    /// [`GpuError::Shader`] if the WGSL does not compile, [`GpuError::Pass`] if it does not fit.
+    pub fn new(gpu: &Gpu, kind: &DrawKind<'_>, bindings: &[Binding<'_>]) -> Result<Self, GpuError> {
+        let module = compile(gpu, kind.pass, kind.parts, kind.source)?;
+        let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let (layout, group) = bind(
+            gpu,
+            kind.pass,
+            wgpu::ShaderStages::VERTEX_FRAGMENT,
+            bindings,
+        );
+        let pipeline_layout = gpu
+            .device
+            .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(kind.pass),
+                bind_group_layouts: &[Some(&layout)],
+                immediate_size: 0,
+            });
+        let options = wgpu::PipelineCompilationOptions {
+            constants: kind.constants,
+            ..Default::default()
+        };
+        let targets = kind.fragment.map(|(_, format)| [Some(format.into())]);
+        let pipeline = gpu
+            .device
+            .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(kind.pass),
+                layout: Some(&pipeline_layout),
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some(kind.vertex),
+                    compilation_options: options.clone(),
+                    buffers: &[],
+                },
+                primitive: wgpu::PrimitiveState {
+                    cull_mode: kind.cull,
+                    ..Default::default()
+                },
+                depth_stencil: kind.depth.map(|format| wgpu::DepthStencilState {
+                    format,
+                    depth_write_enabled: Some(true),
+                    depth_compare: Some(wgpu::CompareFunction::Less),
+                    stencil: wgpu::StencilState::default(),
+                    bias: wgpu::DepthBiasState::default(),
+                }),
+                multisample: wgpu::MultisampleState::default(),
+                fragment: kind.fragment.zip(targets.as_ref()).map(
+                    |((entry_point, _), targets)| wgpu::FragmentState {
+                        module: &module,
+                        entry_point: Some(entry_point),
+                        compilation_options: options.clone(),
+                        targets,
+                    },
+                ),
+                multiview_mask: None,
+                cache: None,
+            });
+        match pollster::block_on(scope.pop()) {
+            None => Ok(Self {
+                pipeline,
+                bindings: group,
+            }),
+            Some(error) => Err(GpuError::Pass {
+                pass: kind.pass,
+                message: error.to_string(),
+            }),
+        }
+    }
+
+    /// Makes `pass` use this pipeline and its bindings.
+    pub fn set(&self, pass: &mut wgpu::RenderPass<'_>) {
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.bindings, &[]);
+    }
+}
+
+/// A texture that is drawn to and then read, with its view.
+pub struct Target {
+    /// The texture.
+    pub texture: wgpu::Texture,
+    /// All of it.
+    pub view: wgpu::TextureView,
+}
+
+impl Target {
+    /// A target of `size` [px].
+    pub fn new(gpu: &Gpu, label: &str, size: [u32; 2], format: wgpu::TextureFormat) -> Self {
+        let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d {
+                width: size[0],
+                height: size[1],
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+                | wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        Self { texture, view }
+    }
+}
+
+/// A colour attachment that is cleared to nothing.
+pub fn cleared(view: &wgpu::TextureView) -> Option<wgpu::RenderPassColorAttachment<'_>> {
+    Some(wgpu::RenderPassColorAttachment {
+        view,
+        depth_slice: None,
+        resolve_target: None,
+        ops: wgpu::Operations {
+            load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+            store: wgpu::StoreOp::Store,
+        },
+    })
+}
+
+/// A depth attachment that is cleared to the far end.
+pub fn cleared_depth(view: &wgpu::TextureView) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations {
+            load: wgpu::LoadOp::Clear(1.0),
+            store: wgpu::StoreOp::Store,
+        }),
+        stencil_ops: None,
+    }
+}

@@ -1,0 +1,300 @@
+//! The passes of a scene, and one frame of them in order.
+
+use super::draw::Target;
+use super::light_path::{LightPath, RefitCounts};
+use super::lightmap::{LightMap, uv_per_m};
+use super::maps::Maps;
+use super::mesh_buffers::MeshBuffers;
+use super::shadow::Shadow;
+use super::surface::{NoShadow, Surface, SurfaceInputs, shadow_inputs};
+use super::tangents::Tangents;
+use super::tonemap::ToneMap;
+use super::tools::{DrawnTool, Tools, ToolsView};
+use super::view::{FrameUniform, View, placed_lights, shadow_from_world};
+use super::{DEPTH_FORMAT, PICTURE_FORMAT, RADIANCE_FORMAT};
+use crate::geom::SurfaceMesh;
+use crate::geom::paint::TissueMaps;
+use crate::geom::patch::radius_from_extinction_m;
+use crate::geom::plane::LightPathMethod;
+use crate::gpu::{Gpu, GpuError, Timer, uniform};
+use crate::scene::{PlacedLight, RestBox, Scene, SurfaceKind, SurfaceSection};
+use glam::{Mat4, Vec3};
+
+/// Light that is left at the radius of a patch: ε of François 2006, section 2.2.
+const PATCH_EPSILON: f32 = 0.01;
+
+/// What a frame records, in order. A pass that the scene does not ask for is never built.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FramePlan {
+    /// Names of the passes, in the order they are recorded.
+    pub passes: Vec<&'static str>,
+    /// Names of passes that other scenes have and this one does not.
+    pub left_out: Vec<&'static str>,
+}
+
+impl FramePlan {
+    /// Decides from plain data, without a GPU.
+    pub fn for_scene(scene: &Scene) -> Self {
+        let kind = scene.surface.kind;
+        let method = effective_method(scene);
+        let shadow = scene.lights.iter().any(|light| light.shadow);
+        let gooey = kind == SurfaceKind::Gooey;
+        let wanted = [
+            ("normals", true),
+            ("tangents", true),
+            ("planes-carried", method == Some(LightPathMethod::Carried)),
+            ("planes-full", method == Some(LightPathMethod::Full)),
+            ("planes-incremental", method == Some(LightPathMethod::Incremental)),
+            (Shadow::NAME, shadow),
+            (LightMap::NAME, gooey),
+            (LightMap::BLUR_NAME, gooey && scene.surface.blur_passes > 0),
+            ("plain", kind == SurfaceKind::Plain),
+            ("subsurface", kind == SurfaceKind::Subsurface),
+            ("gooey", gooey),
+            (Tools::NAME, !scene.tools.is_empty()),
+            (ToneMap::NAME, true),
+        ];
+        let names = |is_wanted: bool| {
+            wanted
+                .iter()
+                .filter(|(_, wanted)| *wanted == is_wanted)
+                .map(|(name, _)| *name)
+                .collect()
+        };
+        Self {
+            passes: names(true),
+            left_out: names(false),
+        }
+    }
+}
+
+/// The light path of a scene; nothing where its surface marches no light.
+fn effective_method(scene: &Scene) -> Option<LightPathMethod> {
+    (scene.surface.kind == SurfaceKind::Subsurface).then_some(scene.light_path.method)
+}
+
+/// All passes of one scene and what they draw into.
+pub struct FramePasses {
+    /// The mesh on the GPU.
+    pub mesh: MeshBuffers,
+    /// Normals, tangents and texture gradients.
+    pub tangents: Tangents,
+    /// Light-path planes.
+    pub light_path: LightPath,
+    /// Linear radiance, coverage in alpha.
+    pub radiance: Target,
+    /// Depth, 0 near to 1 far.
+    pub depth: Target,
+    /// What is shown.
+    pub picture: Target,
+    shadow: Option<Shadow>,
+    light_map: Option<LightMap>,
+    surface: Surface,
+    tools: Tools,
+    tone_map: ToneMap,
+    frame: wgpu::Buffer,
+    lights: Vec<PlacedLight>,
+    knobs: SurfaceSection,
+    uv_per_m: f32,
+    size: [u32; 2],
+}
+
+/// Radius of the patches of a scene [m]: told, or from the first layer's extinction.
+pub fn patch_radius_m(scene: &Scene) -> f32 {
+    scene.light_path.radius_m.unwrap_or_else(|| {
+        radius_from_extinction_m(scene.surface.first_extinction_per_m(), PATCH_EPSILON)
+    })
+}
+
+impl FramePasses {
+    /// Builds what `scene` needs and nothing else, for pictures of `size` [px].
+    ///
+    /// # Errors
+    ///
+    /// [`GpuError`] naming the pass and what the adapter refused.
+    pub fn new(
+        gpu: &Gpu,
+        scene: &Scene,
+        rest: &RestBox,
+        surface_mesh: &SurfaceMesh,
+        tissue: &TissueMaps,
+        size: [u32; 2],
+    ) -> Result<Self, GpuError> {
+        let mesh = MeshBuffers::new(gpu, surface_mesh)?;
+        let tangents = Tangents::new(gpu, surface_mesh, &mesh)?;
+        let radius_m = patch_radius_m(scene);
+        let tolerance_m = scene.light_path.tolerance_m.unwrap_or(radius_m / 2000.0);
+        let light_path = LightPath::new(
+            gpu,
+            effective_method(scene).unwrap_or(LightPathMethod::Tangent),
+            radius_m,
+            tolerance_m,
+            surface_mesh,
+            &mesh,
+            &tangents,
+        )?;
+        let lights = placed_lights(scene, rest);
+        let shadow = if lights.iter().any(|light| light.shadow) {
+            Some(Shadow::new(gpu, &mesh)?)
+        } else {
+            None
+        };
+        let uv_per_m = uv_per_m(surface_mesh);
+        let view = View {
+            eye: Vec3::Z,
+            target: Vec3::ZERO,
+            fov_y: 1.0,
+        };
+        let frame = uniform(
+            gpu,
+            "frame",
+            &FrameUniform::new(&view, 1.0, &lights, &scene.surface, Mat4::IDENTITY, uv_per_m),
+        );
+        let maps = Maps::new(gpu, tissue);
+        let nothing = NoShadow::new(gpu);
+        let (shadow_view, shadow_sampler) = shadow_inputs(shadow.as_ref(), &nothing);
+        let inputs = SurfaceInputs {
+            frame: &frame,
+            mesh: &mesh,
+            tangents: &tangents,
+            maps: &maps,
+            planes: light_path.planes().unwrap_or(&tangents.normals),
+            has_planes: light_path.planes().is_some(),
+            shadow_view,
+            shadow_sampler,
+            has_shadow: shadow.is_some(),
+        };
+        let light_map = if scene.surface.kind == SurfaceKind::Gooey {
+            Some(LightMap::new(
+                gpu,
+                scene.surface.light_map_size_px,
+                scene.surface.blur_passes,
+                &inputs,
+            )?)
+        } else {
+            None
+        };
+        let light_map_view = light_map.as_ref().map_or(&maps.outer, LightMap::view);
+        let surface = Surface::new(gpu, &scene.surface, &inputs, light_map_view)?;
+        let (radiance, depth, picture) = targets(gpu, size);
+        Ok(Self {
+            tools: Tools::new(gpu, RADIANCE_FORMAT, DEPTH_FORMAT)?,
+            tone_map: ToneMap::new(gpu, &radiance)?,
+            mesh,
+            tangents,
+            light_path,
+            radiance,
+            depth,
+            picture,
+            shadow,
+            light_map,
+            surface,
+            frame,
+            lights,
+            knobs: scene.surface.clone(),
+            uv_per_m,
+            size,
+        })
+    }
+
+    /// Width and height of the picture [px].
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// Makes the picture another size.
+    ///
+    /// # Errors
+    ///
+    /// [`GpuError`] if the adapter refuses the pass that reads it.
+    pub fn resize(&mut self, gpu: &Gpu, size: [u32; 2]) -> Result<(), GpuError> {
+        (self.radiance, self.depth, self.picture) = targets(gpu, size);
+        self.tone_map = ToneMap::new(gpu, &self.radiance)?;
+        self.size = size;
+        Ok(())
+    }
+
+    /// Takes over changed knobs of the surface; what needs other passes needs [`FramePasses::new`].
+    pub fn set_knobs(&mut self, section: &SurfaceSection) {
+        self.knobs = section.clone();
+    }
+
+    /// Records one frame: the surface lies at `points`, seen by `view`, with `tools` over it.
+    pub fn record(
+        &self,
+        gpu: &Gpu,
+        points: &[Vec3],
+        view: &View,
+        tools: &[DrawnTool],
+        encoder: &mut wgpu::CommandEncoder,
+        timer: &mut Timer,
+    ) {
+        let aspect = self.size[0] as f32 / self.size[1] as f32;
+        let shadow_from_world = match (&self.shadow, self.lights.first()) {
+            (Some(_), Some(light)) => shadow_from_world(light.place, points),
+            _ => Mat4::IDENTITY,
+        };
+        let frame = FrameUniform::new(
+            view,
+            aspect,
+            &self.lights,
+            &self.knobs,
+            shadow_from_world,
+            self.uv_per_m,
+        );
+        gpu.queue
+            .write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
+        self.mesh.upload(gpu, points);
+
+        // Normals, tangents and texture gradients of the surface as it lies now.
+        self.tangents.record(encoder, timer);
+        // Planes of the patches, as far as the method brings them up to date.
+        self.light_path.record(encoder, timer);
+        // Where the first light is cut off.
+        if let Some(shadow) = &self.shadow {
+            shadow.record(gpu, shadow_from_world, &self.mesh, encoder, timer);
+        }
+        // Irradiance in texture space, blurred; only the gooey surface reads it.
+        if let Some(light_map) = &self.light_map {
+            let radius = self.knobs.blur_radius_m * self.uv_per_m;
+            light_map.record(gpu, radius, &self.mesh, encoder, timer);
+        }
+        // The one surface model of the scene.
+        self.surface
+            .record(&self.mesh, &self.radiance, &self.depth, encoder, timer);
+        // What prods it.
+        let tools_view = ToolsView {
+            clip_from_world: frame.clip_from_world,
+            eye: frame.eye,
+        };
+        self.tools.record(
+            gpu,
+            &tools_view,
+            tools,
+            &self.radiance.view,
+            &self.depth.view,
+            encoder,
+            timer,
+        );
+        // Exposure, tone curve, sRGB, backdrop.
+        self.tone_map
+            .record(gpu, self.knobs.exposure, &self.picture, encoder, timer);
+    }
+
+    /// What the last submitted frame fitted.
+    ///
+    /// # Errors
+    ///
+    /// [`GpuError::ReadBack`] if the counts can't be read.
+    pub fn refit_counts(&self, gpu: &Gpu) -> Result<RefitCounts, GpuError> {
+        self.light_path.counts(gpu)
+    }
+}
+
+fn targets(gpu: &Gpu, size: [u32; 2]) -> (Target, Target, Target) {
+    (
+        Target::new(gpu, "radiance", size, RADIANCE_FORMAT),
+        Target::new(gpu, "depth", size, DEPTH_FORMAT),
+        Target::new(gpu, "picture", size, PICTURE_FORMAT),
+    )
+}

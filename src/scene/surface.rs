@@ -1,0 +1,178 @@
+//! `[surface]`: the one surface model of a scene, its layers and its knobs.
+
+use super::check::Checker;
+use serde::{Deserialize, Serialize};
+
+/// Layers that one RGBA texture holds.
+pub const LAYERS: usize = 4;
+
+/// How the surface is drawn.
+#[derive(Clone, Debug, Deserialize, Serialize, PartialEq)]
+#[serde(deny_unknown_fields, default)]
+pub struct SurfaceSection {
+    /// Which model.
+    pub kind: SurfaceKind,
+    /// `subsurface`: places along the view ray where light is gathered.
+    pub samples: u32,
+    /// `subsurface`: how the light between them is summed.
+    pub quadrature: Quadrature,
+    /// `subsurface`: depth that the value 1 of the layer texture stands for [m].
+    pub layer_depth_max_m: f32,
+    /// `subsurface`: the four layers, outermost first; the last goes on below its boundary.
+    #[serde(rename = "layer")]
+    pub layers: [LayerSection; LAYERS],
+    /// `subsurface`: how far the colour textures tint the layers (Norberg 2010, 5.1), 0 to 1.
+    pub color_blend: f32,
+    /// `subsurface`: strength of light that scattered more than once, as a wrapped diffuse term.
+    pub multiple_scattering: f32,
+    /// How far that diffuse light reaches round the terminator, 0 to 1.
+    pub wrap: f32,
+    /// `gooey`: distance between the two layers [m].
+    pub layer_distance_m: f32,
+    /// `gooey`: radius of the light map's blur [m].
+    pub blur_radius_m: f32,
+    /// `gooey`: times that it is blurred.
+    pub blur_passes: u32,
+    /// `gooey`: multiplies the opacity of the outer layer.
+    pub outer_opacity: f32,
+    /// `gooey`: side of the light map [px].
+    pub light_map_size_px: u32,
+    /// Strength of the normal map.
+    pub relief: f32,
+    /// Roughness of the wet film: 0 a mirror, 1 dull.
+    pub roughness: f32,
+    /// Strength of reflections on the wet film.
+    pub wetness: f32,
+    /// Multiplies radiance before the tone map.
+    pub exposure: f32,
+}
+
+/// The surface models.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum SurfaceKind {
+    /// Lit, no scattering.
+    Plain,
+    /// Single scattering in layers: François 2006, Norberg 2010.
+    #[default]
+    Subsurface,
+    /// Two layers with parallax and a blurred light map: Oat 2006.
+    Gooey,
+}
+
+impl SurfaceKind {
+    /// Name in scene files, logs and charts.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Plain => "plain",
+            Self::Subsurface => "subsurface",
+            Self::Gooey => "gooey",
+        }
+    }
+}
+
+/// How light along the view ray is summed.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum Quadrature {
+    /// Equal steps, each valued at its start (François 2006, Algorithm 1).
+    Published,
+    /// Steps that grow with depth, each integrated in closed form.
+    #[default]
+    ClosedForm,
+}
+
+/// One layer of tissue.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct LayerSection {
+    /// Absorption σ_a [1/m], red, green, blue.
+    pub absorption_per_m: [f32; 3],
+    /// Scattering σ_s [1/m].
+    pub scattering_per_m: [f32; 3],
+    /// Schlick's k, which the papers call g: above 0 light is scattered forwards.
+    pub asymmetry: f32,
+}
+
+impl Default for SurfaceSection {
+    fn default() -> Self {
+        let layer = |absorption_per_m, scattering_per_m, asymmetry| LayerSection {
+            absorption_per_m,
+            scattering_per_m,
+            asymmetry,
+        };
+        Self {
+            kind: SurfaceKind::default(),
+            samples: 6,
+            quadrature: Quadrature::default(),
+            layer_depth_max_m: 0.006,
+            // Ratios between the colours as published for blood-rich tissue; all of it about six
+            // times clearer, so that what lies below shows at the distance of a whole organ.
+            layers: [
+                layer([15.0, 30.0, 35.0], [120.0, 130.0, 140.0], 0.3),
+                layer([60.0, 800.0, 1000.0], [250.0, 270.0, 290.0], 0.4),
+                layer([180.0, 1700.0, 1500.0], [140.0, 120.0, 160.0], 0.5),
+                layer([75.0, 1000.0, 1250.0], [250.0, 270.0, 290.0], 0.4),
+            ],
+            color_blend: 0.7,
+            multiple_scattering: 1.0,
+            wrap: 0.35,
+            layer_distance_m: 0.0015,
+            blur_radius_m: 0.004,
+            blur_passes: 2,
+            outer_opacity: 1.0,
+            light_map_size_px: 256,
+            relief: 1.0,
+            roughness: 0.24,
+            wetness: 1.0,
+            exposure: 1.0,
+        }
+    }
+}
+
+impl SurfaceSection {
+    /// Extinction σ_t of the first layer, of the colour that reaches deepest [1/m].
+    pub fn first_extinction_per_m(&self) -> f32 {
+        let layer = &self.layers[0];
+        (0..3)
+            .map(|c| layer.absorption_per_m[c] + layer.scattering_per_m[c])
+            .fold(f32::INFINITY, f32::min)
+    }
+
+    pub(super) fn check(&self, c: &mut Checker) {
+        c.range("surface.samples", self.samples as f32, 1.0, 256.0);
+        c.range("surface.layer_depth_max_m", self.layer_depth_max_m, 1e-6, 1.0);
+        for (index, layer) in self.layers.iter().enumerate() {
+            let key = |name: &str| format!("surface.layer.{index}.{name}");
+            c.range3(&key("absorption_per_m"), layer.absorption_per_m, 0.0, 1e6);
+            c.range3(&key("scattering_per_m"), layer.scattering_per_m, 0.0, 1e6);
+            c.range(&key("asymmetry"), layer.asymmetry, -0.98, 0.98);
+            let clear = (0..3)
+                .any(|i| layer.absorption_per_m[i] + layer.scattering_per_m[i] < 1e-3);
+            if clear {
+                c.problem(&key("scattering_per_m"), "absorption + scattering must be at least 0.001");
+            }
+        }
+        for (name, value, high) in [
+            ("color_blend", self.color_blend, 1.0),
+            ("multiple_scattering", self.multiple_scattering, 10.0),
+            ("wrap", self.wrap, 1.0),
+            ("layer_distance_m", self.layer_distance_m, 1.0),
+            ("blur_radius_m", self.blur_radius_m, 1.0),
+            ("blur_passes", self.blur_passes as f32, 8.0),
+            ("outer_opacity", self.outer_opacity, 4.0),
+            ("relief", self.relief, 4.0),
+            ("wetness", self.wetness, 4.0),
+            ("exposure", self.exposure, 100.0),
+        ] {
+            c.range(&format!("surface.{name}"), value, 0.0, high);
+        }
+        c.range("surface.roughness", self.roughness, 0.02, 1.0);
+        c.range(
+            "surface.light_map_size_px",
+            self.light_map_size_px as f32,
+            32.0,
+            4096.0,
+        );
+    }
+}
