@@ -347,6 +347,23 @@ fn strided_views_that_overlap_or_overrun_are_refused() {
 }
 
 #[test]
+fn sparse_values_replace_those_of_the_view() {
+    // Three corners from the view; the second is then overridden by the bytes of the third.
+    let folder = Folder::new();
+    let text = gltf(
+        r#"{"accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 3,
+        "sparse": {"count": 1, "indices": {"bufferView": 1, "componentType": 5121},
+        "values": {"bufferView": 0, "byteOffset": 24}}}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 1, "byteLength": 1}],
+        "buffers": [{"byteLength": 36,
+        "uri": "data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"},
+        {"byteLength": 1, "uri": "data:;base64,AQ=="}]}"#,
+    );
+    let file = read_parts(&folder.write("sparse.gltf", text)).expect("it holds a triangle");
+    assert_eq!(file.parts[0].positions, [Vec3::ZERO, Vec3::Y, Vec3::Y]);
+}
+
+#[test]
 fn mirrored_node_still_faces_outwards_without_a_repair() {
     let mirrored = with_json(&cube_glb(), |json| {
         json.replace(r#"{"mesh":0,"#, r#"{"mesh":0,"scale":[-1,2,1],"#)
@@ -395,7 +412,7 @@ fn obj_polygons_negative_indices_and_missing_library_still_make_a_cube() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(200))]
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn random_bytes_end_in_an_error(bytes in prop::collection::vec(any::<u8>(), 0..300), kind in 0..3) {

@@ -17,7 +17,7 @@ const HARMLESS_EXTENSIONS: [&str; 2] = ["KHR_materials_", "KHR_lights_punctual"]
 
 /// Reads the meshes of the glTF file `path` whose content is `bytes`.
 pub(super) fn read(bytes: &[u8], path: &Path) -> Result<FileParts, ImportFault> {
-    let chunks = container::split(bytes)?;
+    let chunks = container::split(bytes, path)?;
     let root = Root::from_slice(chunks.json)
         .map_err(|error| ImportFault::malformed("JSON", error.to_string()))?;
     check_version(&root)?;
@@ -421,5 +421,20 @@ fn triangulate(corners: &[u32], mode: Mode) -> Option<Vec<[u32; 3]>> {
             Some(rim.windows(2).map(|w| [hub, w[0], w[1]]).collect())
         }
         Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strips_and_fans_keep_the_side_they_face() {
+        let strip = triangulate(&[0, 1, 2, 3, 4], Mode::TriangleStrip);
+        assert_eq!(strip, Some(vec![[0, 1, 2], [1, 3, 2], [2, 3, 4]]));
+        let fan = triangulate(&[7, 1, 2, 3], Mode::TriangleFan);
+        assert_eq!(fan, Some(vec![[7, 1, 2], [7, 2, 3]]));
+        assert_eq!(triangulate(&[0, 1, 2], Mode::LineStrip), None);
+        assert_eq!(triangulate(&[0, 1], Mode::Triangles), Some(Vec::new()));
     }
 }
