@@ -13,5 +13,6 @@
 
 pub mod geom;
 pub mod gpu;
+pub mod measure;
 pub mod passes;
 pub mod sim;
