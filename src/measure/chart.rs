@@ -12,6 +12,10 @@ const TEXT_COLOR: &str = "#3c4048";
 const MARK_COLOR: &str = "#b3261e";
 const LEFT_PX: f64 = 58.0;
 const RIGHT_PX: f64 = 12.0;
+/// Room at the right for the names of levels.
+const LEVEL_NAMES_PX: f64 = 74.0;
+/// Lines of text are this far apart.
+const LINE_PX: f64 = 13.0;
 const BOTTOM_PX: f64 = 38.0;
 const TOP_PX: f64 = 14.0;
 /// Height of the row of names above a chart of several series.
@@ -86,7 +90,10 @@ impl LineChart {
             (low.min(x), high.max(x))
         });
         let names: Vec<&str> = self.series.iter().map(|s| s.label.as_str()).collect();
-        let axes = Axes::new(self.size_px, (first, last), (low, high), names.len() > 1);
+        let mut axes = Axes::new(self.size_px, (first, last), (low, high), names.len() > 1);
+        if !self.levels.is_empty() {
+            axes.right -= LEVEL_NAMES_PX;
+        }
         let mut svg = axes.open(&self.x_label, &self.y_label);
         if names.len() > 1 {
             svg += &legend(&names);
@@ -97,7 +104,7 @@ impl LineChart {
                 svg,
                 "<path d=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.3\" \
                  stroke-linejoin=\"round\"/>",
-                axes.path(&series.points, self.ceiling)
+                axes.path(&series.points)
             )
             .expect(TEXT_EXPECT);
         }
@@ -114,14 +121,14 @@ impl LineChart {
         let mut text_floor = f64::MAX;
         for level in ordered {
             let y = axes.y(level.value);
-            let text_y = (y - 3.0).min(text_floor - 12.0);
-            text_floor = text_y;
+            let text_y = (y + 4.0).min(text_floor);
+            text_floor = text_y - LINE_PX;
             write!(
                 svg,
                 "<line x1=\"{LEFT_PX}\" x2=\"{right:.1}\" y1=\"{y:.1}\" y2=\"{y:.1}\" \
                  stroke=\"{MARK_COLOR}\" stroke-width=\"1\" stroke-dasharray=\"5 3\"/>\
-                 <text x=\"{right:.1}\" y=\"{text_y:.1}\" text-anchor=\"end\" fill=\"{MARK_COLOR}\" \
-                 stroke=\"#fff\" stroke-width=\"3\" paint-order=\"stroke\">{}</text>",
+                 <text x=\"{:.1}\" y=\"{text_y:.1}\" fill=\"{MARK_COLOR}\">{}</text>",
+                axes.right + 6.0,
                 escape(&level.label),
                 right = axes.right,
             )
@@ -322,7 +329,7 @@ impl Axes {
 
     /// The path through `points`. Where there are more than pixels, each pixel column shows its
     /// smallest and largest value, so that no peak is lost.
-    fn path(&self, points: &[(f64, f64)], ceiling: Option<f64>) -> String {
+    fn path(&self, points: &[(f64, f64)]) -> String {
         let columns = self.right - LEFT_PX;
         let per_column = (points.len() as f64 / columns / 2.0).ceil().max(1.0) as usize;
         let mut path = String::new();
@@ -340,7 +347,7 @@ impl Axes {
                     pen_down = false;
                     continue;
                 }
-                let y = ceiling.map_or(y, |ceiling| y.min(ceiling));
+                let y = y.min(self.y_range.1);
                 let command = if pen_down { 'L' } else { 'M' };
                 write!(path, "{command}{:.1} {:.1}", self.x(x), self.y(y)).expect(TEXT_EXPECT);
                 pen_down = true;
@@ -364,8 +371,8 @@ fn legend(names: &[&str]) -> String {
             escape(name)
         )
         .expect(TEXT_EXPECT);
-        // Without font metrics: letters of 11 px are near 6 px wide.
-        x += 30.0 + 6.0 * name.chars().count() as f64;
+        // Without font metrics: letters of 11 px are near 6.4 px wide.
+        x += 34.0 + 6.4 * name.chars().count() as f64;
     }
     svg
 }
@@ -386,6 +393,16 @@ fn ticks((low, high): (f64, f64), step: f64) -> impl Iterator<Item = f64> {
     let last = (high / step + 1e-6).floor() as i64;
     // Ranges come from data and may be absurd; a hundred ticks are none.
     (first..=last.min(first.saturating_add(100))).map(move |k| k as f64 * step)
+}
+
+/// A number to three digits, with the zeros at its end: columns of them line up.
+pub fn three_digits(value: f64) -> String {
+    let magnitude = value.abs().log10().floor();
+    if !(-2.0..2.0).contains(&magnitude) {
+        return number(value);
+    }
+    let decimals = (2.0 - magnitude) as usize;
+    format!("{value:.decimals$}").replace('-', "−")
 }
 
 /// A number in as few characters as tell it: three digits, powers of ten for the far ends.
@@ -475,6 +492,13 @@ mod tests {
         for (value, text) in cases {
             assert_eq!(number(value), text);
         }
+    }
+
+    #[test]
+    fn numbers_in_columns_keep_their_zeros() {
+        let texts = [20.0, 4.1, 0.7, 0.05, 159.0, -1.5].map(three_digits);
+        assert_eq!(texts, ["20.0", "4.10", "0.700", "0.0500", "159", "−1.50"]);
+        assert_eq!([0.0, 2e-6].map(three_digits), ["0", "2·10⁻⁶"]);
     }
 
     #[test]

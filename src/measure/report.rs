@@ -1,6 +1,6 @@
 //! The report of a replay: what ran on what machine, what each frame cost, and how far off it was.
 
-use super::chart::{BARS_MAX, Level, LineChart, Series, StackedChart, number};
+use super::chart::{BARS_MAX, Level, LineChart, Series, StackedChart, number, three_digits};
 use super::log::{FrameRecord, pass_names};
 use super::page::{Block, KeyFigure, Page, Section, Table};
 use super::stats::{Stats, percentile, sorted};
@@ -90,9 +90,9 @@ fn lead(summary: &Summary) -> String {
         Some(frame) => format!(
             "Half of the frames took at most {} ms and 99 % at most {} ms; the slowest 1 % took {} ms \
              on average. ",
-            number(frame.p50),
-            number(frame.p99),
-            number(frame.low1pct)
+            three_digits(frame.p50),
+            three_digits(frame.p99),
+            three_digits(frame.low1pct)
         ),
         None => "No frame was finished. ".to_owned(),
     };
@@ -113,28 +113,40 @@ fn lead(summary: &Summary) -> String {
 }
 
 fn figures(summary: &Summary) -> Vec<KeyFigure> {
-    let figure = |label: &str, value: f64, unit: &str| KeyFigure {
+    let figure = |label: &str, value: String, unit: &str| KeyFigure {
         label: label.to_owned(),
-        value: number(value),
+        value,
         unit: unit.to_owned(),
     };
     let mut figures = Vec::new();
     if let Some(frame) = &summary.frame_ms {
-        figures.push(figure("Frame, median", frame.p50, "ms"));
-        figures.push(figure("Frame, 99th percentile", frame.p99, "ms"));
+        figures.push(figure("Frame, median", three_digits(frame.p50), "ms"));
+        figures.push(figure(
+            "Frame, 99th percentile",
+            three_digits(frame.p99),
+            "ms",
+        ));
     }
     if let Some(simulation) = &summary.sim_ms {
-        figures.push(figure("Simulation, median", simulation.p50, "ms"));
+        figures.push(figure(
+            "Simulation, median",
+            three_digits(simulation.p50),
+            "ms",
+        ));
     }
     figures.push(figure(
         "Volume drift, largest",
-        100.0 * summary.volume_drift.max,
+        number(100.0 * summary.volume_drift.max),
         "%",
     ));
-    figures.push(figure("Tool force, largest", summary.tool.force_max_n, "N"));
+    figures.push(figure(
+        "Tool force, largest",
+        number(summary.tool.force_max_n),
+        "N",
+    ));
     figures.push(figure(
         "Penetration, deepest",
-        1e3 * summary.tool.penetration_max_m,
+        number(1e3 * summary.tool.penetration_max_m),
         "mm",
     ));
     figures
@@ -150,7 +162,7 @@ fn frame_times(summary: &Summary, records: &[FrameRecord]) -> Section {
     if let Some(frame) = &summary.frame_ms {
         for (name, value) in [("p50", frame.p50), ("p95", frame.p95), ("p99", frame.p99)] {
             levels.push(Level {
-                label: format!("{name} {} ms", number(value)),
+                label: format!("{name} {} ms", three_digits(value)),
                 value,
             });
         }
@@ -175,7 +187,7 @@ fn frame_times(summary: &Summary, records: &[FrameRecord]) -> Section {
                 caption: format!(
                     "Wall time of every frame, with the median, the 95th and the 99th percentile. Red \
                      triangles mark frames beyond the top; the slowest took {} ms.",
-                    number(max)
+                    three_digits(max)
                 ),
             },
             Block::Table(times_table(&[
@@ -190,7 +202,7 @@ fn times_table(rows: &[(&str, Option<Stats>)]) -> Table {
     let head = ["", "p50 ms", "p95 ms", "p99 ms", "max ms", "slowest 1 % ms"];
     let row = |(name, stats): &(&str, Option<Stats>)| {
         let stats = (*stats)?;
-        let cells = [stats.p50, stats.p95, stats.p99, stats.max, stats.low1pct].map(number);
+        let cells = [stats.p50, stats.p95, stats.p99, stats.max, stats.low1pct].map(three_digits);
         Some(std::iter::once((*name).to_owned()).chain(cells).collect())
     };
     Table {
@@ -234,7 +246,7 @@ fn stages(records: &[FrameRecord]) -> Section {
     let total: f64 = medians.iter().map(|[p50, ..]| p50).sum();
     let rows = layers.iter().zip(&medians).map(|((name, _), times)| {
         let share = format!("{:.0} %", 100.0 * times[0] / total.max(f64::MIN_POSITIVE));
-        let cells = times.iter().map(|&time| number(time));
+        let cells = times.iter().map(|&time| three_digits(time));
         std::iter::once(name.clone())
             .chain(cells)
             .chain([share])
@@ -316,7 +328,7 @@ fn accuracy(records: &[FrameRecord]) -> Section {
 fn passes(summary: &Summary) -> Section {
     let rows = summary.passes.iter().map(|pass| {
         let times = match pass.gpu_ms {
-            Some(gpu) => [gpu.p50, gpu.p95, gpu.max].map(number),
+            Some(gpu) => [gpu.p50, gpu.p95, gpu.max].map(three_digits),
             None => [const { String::new() }; 3],
         };
         [pass.name.clone(), pass.dispatches_or_draws.to_string()]
