@@ -13,6 +13,7 @@
 
 pub mod geom;
 pub mod gpu;
+pub mod measure;
 pub mod passes;
 pub mod scene;
 pub mod sim;

@@ -1,0 +1,225 @@
+//! Files that are whole or absent: written beside their place and moved there when complete.
+
+use npyz::WriterBuilder;
+use std::fmt;
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// A file of a run that could not be written, read or understood.
+#[derive(Debug)]
+pub enum MeasureError {
+    /// The system refused to write it.
+    Write {
+        /// The file.
+        file: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The system refused to read it.
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// It was read but does not hold what it should.
+    Content {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong, and what to do.
+        problem: String,
+    },
+}
+
+impl fmt::Display for MeasureError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Write { file, source } => write!(
+                f,
+                "cannot write {}: {source}; check that the folder may be written and has room",
+                file.display()
+            ),
+            Self::Read { file, source } => {
+                write!(
+                    f,
+                    "cannot read {}: {source}; check the path",
+                    file.display()
+                )
+            }
+            Self::Content { file, problem } => write!(f, "{}: {problem}", file.display()),
+        }
+    }
+}
+
+impl std::error::Error for MeasureError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Write { source, .. } | Self::Read { source, .. } => Some(source),
+            Self::Content { .. } => None,
+        }
+    }
+}
+
+/// Makes the folder and those above it.
+///
+/// # Errors
+///
+/// [`MeasureError::Write`].
+pub fn make_folder(folder: &Path) -> Result<(), MeasureError> {
+    std::fs::create_dir_all(folder).map_err(|source| MeasureError::Write {
+        file: folder.to_owned(),
+        source,
+    })
+}
+
+/// Reads a whole file.
+///
+/// # Errors
+///
+/// [`MeasureError::Read`].
+pub fn read(file: &Path) -> Result<Vec<u8>, MeasureError> {
+    std::fs::read(file).map_err(|source| MeasureError::Read {
+        file: file.to_owned(),
+        source,
+    })
+}
+
+/// Puts `bytes` into `file`, whole or not at all.
+///
+/// # Errors
+///
+/// [`MeasureError::Write`]; what was in `file` before is then still there.
+pub fn write(file: &Path, bytes: &[u8]) -> Result<(), MeasureError> {
+    write_with(file, |out| out.write_all(bytes))
+}
+
+/// Lets `fill` write the content of `file`, which appears under its name only when complete.
+///
+/// # Errors
+///
+/// [`MeasureError::Write`] if the system or `fill` fails; what was in `file` before is then still
+/// there.
+pub fn write_with(
+    file: &Path,
+    fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> Result<(), MeasureError> {
+    let mut name = file.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".{}.partial", std::process::id()));
+    let partial = file.with_file_name(name);
+    let filled = File::create(&partial).and_then(|created| {
+        let mut out = BufWriter::new(created);
+        fill(&mut out)?;
+        out.into_inner()?.sync_data()?;
+        std::fs::rename(&partial, file)
+    });
+    filled.map_err(|source| {
+        // If it cannot be removed either, the first error is the one worth telling.
+        let _ = std::fs::remove_file(&partial);
+        MeasureError::Write {
+            file: file.to_owned(),
+            source,
+        }
+    })
+}
+
+/// Writes `values`, last index fastest, as a NumPy array of `shape`.
+///
+/// # Errors
+///
+/// [`MeasureError::Write`].
+///
+/// # Panics
+///
+/// If `values` has not as many elements as `shape` says.
+pub fn write_npy<T: npyz::AutoSerialize + Copy>(
+    file: &Path,
+    shape: &[u64],
+    values: &[T],
+) -> Result<(), MeasureError> {
+    let count: u64 = shape.iter().product();
+    assert_eq!(values.len() as u64, count, "an array fills its shape");
+    write_with(file, |out| {
+        let mut array = npyz::WriteOptions::new()
+            .default_dtype()
+            .shape(shape)
+            .writer(out)
+            .begin_nd()?;
+        array.extend(values.iter().copied())?;
+        array.finish()
+    })
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    /// A folder of its own for each test, gone when the test ends well.
+    pub struct Folder(pub PathBuf);
+
+    impl Folder {
+        pub fn new() -> Self {
+            static NEXT: AtomicU32 = AtomicU32::new(0);
+            let number = NEXT.fetch_add(1, Ordering::Relaxed);
+            let name = format!("palpate-measure-{}-{number}", std::process::id());
+            let folder = std::env::temp_dir().join(name);
+            make_folder(&folder).expect("the temporary folder can be written");
+            Self(folder)
+        }
+
+        pub fn names(&self) -> Vec<String> {
+            let entries = std::fs::read_dir(&self.0).expect("the folder is there");
+            let name = |entry: io::Result<std::fs::DirEntry>| entry.unwrap().file_name();
+            let mut names: Vec<String> = entries
+                .map(|entry| name(entry).into_string().unwrap())
+                .collect();
+            names.sort();
+            names
+        }
+    }
+
+    impl Drop for Folder {
+        fn drop(&mut self) {
+            let _ = std::fs::remove_dir_all(&self.0);
+        }
+    }
+
+    #[test]
+    fn file_whose_writing_fails_halfway_keeps_its_old_content_and_leaves_nothing_beside() {
+        let folder = Folder::new();
+        let file = folder.0.join("frames.csv");
+        write(&file, b"old").unwrap();
+        let error = write_with(&file, |out| {
+            out.write_all(b"new and half")?;
+            Err(io::Error::other("disk full"))
+        });
+        assert!(error.unwrap_err().to_string().contains("frames.csv"));
+        assert_eq!(read(&file).unwrap(), b"old");
+        assert_eq!(folder.names(), ["frames.csv"]);
+    }
+
+    #[test]
+    fn writing_into_a_folder_that_is_absent_names_the_file() {
+        let folder = Folder::new();
+        let error = write(&folder.0.join("absent/x.csv"), b"").unwrap_err();
+        assert!(error.to_string().contains("absent"), "{error}");
+    }
+
+    #[test]
+    fn npy_reads_back_with_its_shape_and_values() {
+        let folder = Folder::new();
+        let file = folder.0.join("positions.npy");
+        let values = [1.0_f32, 2.0, 3.0, -4.0, 5.5, 6.0];
+        write_npy(&file, &[2, 3], &values).unwrap();
+        let bytes = read(&file).unwrap();
+        let array = npyz::NpyFile::new(&bytes[..]).unwrap();
+        assert_eq!(array.shape(), [2, 3]);
+        assert_eq!(array.order(), npyz::Order::C);
+        assert_eq!(array.into_vec::<f32>().unwrap(), values);
+        write_npy(&file, &[1, 3], &[7_u32, 8, 9]).unwrap();
+        let bytes = read(&file).unwrap();
+        let array = npyz::NpyFile::new(&bytes[..]).unwrap();
+        assert_eq!(array.into_vec::<u32>().unwrap(), [7, 8, 9]);
+    }
+}

@@ -1,0 +1,14 @@
+//! What a run cost and how far off it was: statistics, the frame log, recorded states and the files
+//! they end in. Plain data in, files out; nothing here knows of bodies, passes or scenes.
+
+pub mod against;
+pub mod chart;
+pub mod files;
+pub mod log;
+pub mod page;
+pub mod pictures;
+pub mod report;
+pub mod states;
+pub mod stats;
+pub mod summary;
+pub mod trace;

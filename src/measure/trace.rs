@@ -1,0 +1,94 @@
+//! `trace.json`: where the time of a run went, for Perfetto and `chrome://tracing`.
+//!
+//! Source: "Trace Event Format", complete events (`X`) and thread names (`M`).
+
+use super::files::{MeasureError, write_with};
+use serde::Serialize;
+use serde_json::json;
+use std::borrow::Cow;
+use std::io::Write;
+use std::path::Path;
+
+/// One stretch of time on one track.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Span {
+    /// What ran.
+    pub name: Cow<'static, str>,
+    /// What kind of work it was: `simulation`, `gpu`, …
+    #[serde(rename = "cat")]
+    pub category: &'static str,
+    /// Start since the beginning of the run [µs].
+    #[serde(rename = "ts")]
+    pub start_us: f64,
+    /// Duration [µs].
+    #[serde(rename = "dur")]
+    pub duration_us: f64,
+    /// The track it is drawn on.
+    #[serde(rename = "tid")]
+    pub thread: u32,
+}
+
+/// Writes `spans`; `threads` names the tracks.
+///
+/// # Errors
+///
+/// [`MeasureError::Write`].
+pub fn write_trace(
+    file: &Path,
+    spans: &[Span],
+    threads: &[(u32, &str)],
+) -> Result<(), MeasureError> {
+    let names = threads.iter().map(|(thread, name)| {
+        json!({
+            "ph": "M", "pid": 1, "tid": thread, "name": "thread_name", "args": { "name": name },
+        })
+    });
+    let spans = spans.iter().map(|span| {
+        let mut event = serde_json::to_value(span).expect("a span has string keys");
+        event["ph"] = json!("X");
+        event["pid"] = json!(1);
+        event
+    });
+    let events: Vec<_> = names.chain(spans).collect();
+    write_with(file, |out| {
+        serde_json::to_writer(
+            &mut *out,
+            &json!({ "displayTimeUnit": "ms", "traceEvents": events }),
+        )?;
+        out.write_all(b"\n")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::files::{read, tests::Folder};
+    use super::*;
+
+    #[test]
+    fn spans_become_complete_events_on_named_threads() {
+        let folder = Folder::new();
+        let file = folder.0.join("trace.json");
+        let span = Span {
+            name: "refit".into(),
+            category: "gpu",
+            start_us: 12.5,
+            duration_us: 3.0,
+            thread: 7,
+        };
+        write_trace(&file, &[span], &[(7, "GPU")]).unwrap();
+        let trace: serde_json::Value = serde_json::from_slice(&read(&file).unwrap()).unwrap();
+        let [name, event] = trace["traceEvents"].as_array().unwrap().as_slice() else {
+            panic!("two events");
+        };
+        assert_eq!(
+            (&name["ph"], &name["args"]["name"]),
+            (&json!("M"), &json!("GPU"))
+        );
+        assert_eq!((&event["ph"], &event["ts"]), (&json!("X"), &json!(12.5)));
+        assert_eq!((&event["dur"], &event["tid"]), (&json!(3.0), &json!(7)));
+        assert_eq!(
+            (&event["name"], &event["cat"]),
+            (&json!("refit"), &json!("gpu"))
+        );
+    }
+}
