@@ -6,6 +6,7 @@
 //!
 //! Axes are those of a patient who faces you: x to the patient's left, y up, z to the front.
 
+mod dual;
 pub mod field;
 mod heart;
 mod liver;

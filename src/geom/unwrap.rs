@@ -27,8 +27,8 @@ const JOINT_SHARE_MAX: f64 = 0.4;
 /// A chart below this share is joined to any other: it costs seams and packs no better.
 const SMALL_SHARE: f64 = 0.06;
 
-/// Pairs of charts that are tried at most; enough for surfaces of 50 charts to settle.
-const MERGE_TRIES_MAX: usize = 160;
+/// Merging ends when it has laid flat this many times the triangles of the surface.
+const MERGE_WORK_MAX: usize = 12;
 
 /// How well a UV map uses its square and keeps lengths.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -89,7 +89,7 @@ fn lay_flat(
 fn merge(positions: &[DVec3], triangles: &[[u32; 3]], faces: &Faces, flats: &mut Vec<Flat>) {
     let mut refused: Vec<(u32, u32)> = Vec::new();
     let whole: f64 = faces.areas.iter().sum();
-    let mut tried = 0;
+    let mut work = 0;
     while let Some((a, b)) = charts::next_merge(faces, flats, &refused) {
         let key = (flats[a].triangles[0], flats[b].triangles[0]);
         let (small, large) = (
@@ -103,8 +103,8 @@ fn merge(positions: &[DVec3], triangles: &[[u32; 3]], faces: &Faces, flats: &mut
         let mut joint = flats[a].triangles.clone();
         joint.extend(&flats[b].triangles);
         joint.sort_unstable();
-        tried += 1;
-        if tried > MERGE_TRIES_MAX {
+        work += joint.len();
+        if work > MERGE_WORK_MAX * triangles.len() {
             return;
         }
         match flatten::flatten(positions, triangles, faces, &joint, STRETCH_MAX) {
