@@ -46,9 +46,7 @@ pub fn unit(h: u32) -> f32 {
 /// Smooth noise in about `[-1, 1]`, zero at every lattice point, with continuous second
 /// derivatives.
 pub fn gradient(p: Vec3, seed: u32) -> f32 {
-    let base = p.floor();
-    let f = p - base;
-    let cell = [base.x as i32, base.y as i32, base.z as i32];
+    let (cell, f) = split(p);
     let fade = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
     let corner = |dx: i32, dy: i32, dz: i32| {
         let h = hash(
@@ -82,8 +80,7 @@ pub fn fractal(p: Vec3, octaves: u32, seed: u32) -> f32 {
 
 /// Distances to the feature points, one in each lattice cell.
 pub fn cellular(p: Vec3, seed: u32) -> Cells {
-    let base = p.floor();
-    let cell = [base.x as i32, base.y as i32, base.z as i32];
+    let (cell, f) = split(p);
     let mut found = Cells {
         nearest: f32::MAX,
         second: f32::MAX,
@@ -105,8 +102,8 @@ pub fn cellular(p: Vec3, seed: u32) -> Cells {
                     unit(mix(h ^ 0x68bc_21eb)),
                     unit(mix(h ^ 0x02e5_be93)),
                 );
-                let feature = base + Vec3::new(dx as f32, dy as f32, dz as f32) + inside;
-                let squared = feature.distance_squared(p);
+                let feature = Vec3::new(dx as f32, dy as f32, dz as f32) + inside;
+                let squared = feature.distance_squared(f);
                 if squared < found.nearest {
                     found.second = found.nearest;
                     found.nearest = squared;
@@ -131,6 +128,16 @@ pub fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
 /// `a` at `t = 0`, `b` at `t = 1`.
 pub fn lerp(a: f32, b: f32, t: f32) -> f32 {
     a + (b - a) * t
+}
+
+/// The lattice cell of `p` and the place in it. By truncation, since `floor` is a call to the
+/// maths library on processors without SSE4.1.
+fn split(p: Vec3) -> ([i32; 3], Vec3) {
+    let cell = p.to_array().map(|x| {
+        let whole = x as i32;
+        whole - i32::from(x < whole as f32)
+    });
+    (cell, p - Vec3::from(cell.map(|n| n as f32)))
 }
 
 /// Dot product of `offset` with one of the twelve edge directions of a cube, picked by `h`.

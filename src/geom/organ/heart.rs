@@ -223,7 +223,8 @@ pub fn features(p: Vec3) -> Features {
     Features {
         fat: groove.max(0.8 * root),
         artery: wall(AORTA, AORTA_RADIUS),
-        vein: wall(TRUNK, TRUNK_RADIUS)
+        // The trunk grows out of the muscle without a border.
+        vein: (wall(TRUNK, TRUNK_RADIUS) * smoothstep(1.3, 2.7, p.y + 0.5 * gradient(p / 0.6, 24)))
             .max(wall(CAVA, CAVA_RADIUS))
             .max(wall(LOWER_CAVA, CAVA_RADIUS)),
         lumen: hollow,

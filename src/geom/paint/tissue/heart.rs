@@ -82,9 +82,9 @@ pub fn dab(site: &Site, large: Option<Near>, fine: Option<Near>) -> Dab {
     };
 
     // Fat lies in the grooves and along the large arteries.
-    let lumps = 0.45 * fractal(p / 0.7, 3, 7);
+    let lumps = 0.5 * fractal(p / 0.6, 4, 7);
     let groove = (features.fat).max(0.75 * site.hollow * smoothstep(0.3, 0.7, site.height));
-    let amount = smoothstep(0.42, 0.72, groove + 0.55 * stem * beside + lumps)
+    let amount = smoothstep(0.36, 0.9, groove + 0.5 * stem * beside + lumps)
         * (1.0 - features.artery.max(features.vein));
     let (colour, relief) = fat(p);
     dab.outer = dab.outer.lerp(colour, 0.92 * amount);
@@ -98,7 +98,7 @@ pub fn dab(site: &Site, large: Option<Near>, fine: Option<Near>) -> Dab {
     let shown = artery * (1.0 - 0.35 * amount) * (1.0 - features.artery.max(features.vein));
     dab.outer = dab.outer.lerp(rgb(138, 34, 30), 0.85 * shown);
     dab.inner = dab.inner.lerp(rgb(120, 12, 14), 0.8 * artery);
-    dab.relief += 0.022 * artery * (1.0 - 0.3 * amount);
+    dab.relief += 0.013 * artery * (1.0 - 0.3 * amount);
     dab.depths[2] = lerp(dab.depths[2], 0.8, artery);
     great_vessels(site, &mut dab);
     dab
@@ -112,15 +112,15 @@ fn great_vessels(site: &Site, dab: &mut Dab) {
     let walls = [
         (
             features.artery,
-            rgb(176, 116, 98),
-            rgb(206, 160, 138),
+            rgb(166, 112, 96),
+            rgb(194, 150, 130),
             rgb(150, 70, 56),
         ),
         (
             features.vein,
-            rgb(98, 66, 84),
-            rgb(140, 104, 116),
-            rgb(70, 26, 44),
+            rgb(122, 82, 86),
+            rgb(162, 122, 118),
+            rgb(96, 40, 48),
         ),
     ];
     for (amount, dark, light, deep) in walls {
