@@ -6,11 +6,14 @@
 //!
 //! Axes are those of a patient who faces you: x to the patient's left, y up, z to the front.
 
+mod bundle;
 mod dual;
 pub mod field;
 mod heart;
 mod liver;
 mod surface;
+
+pub use bundle::{BundledFile, MAP_SIZE_PX, bundled_files};
 
 use super::SurfaceMesh;
 use super::unwrap::unwrap;

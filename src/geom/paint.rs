@@ -158,23 +158,28 @@ fn maps(size_px: u32, dabs: &[Option<Dab>], normals: &[Vec3]) -> TissueMaps {
         inner: mean(|dab| dab.inner),
         depths: [0.1, 0.4, 0.5, 1.0],
     };
-    let image = |texel: &dyn Fn(&Dab, Vec3) -> [f32; 4]| {
+    // Colours and depths are rounded to every `step`-th value: noise hides it, and the pictures
+    // pack into half the bytes.
+    let image = |step: f32, texel: &dyn Fn(&Dab, Vec3) -> [f32; 4]| {
         RgbaImage::from_fn(size_px, size_px, |x, y| {
             let at = (y * size_px + x) as usize;
             let channels = texel(dabs[at].as_ref().unwrap_or(&empty), normals[at]);
-            Rgba(channels.map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8))
+            Rgba(channels.map(|c| {
+                let rounded = (c.clamp(0.0, 1.0) * 255.0 / step + 0.5) as u8;
+                (f32::from(rounded) * step) as u8
+            }))
         })
     };
     TissueMaps {
         size_px,
-        outer: image(&|dab, _| dab.outer.extend(dab.opacity).to_array()),
-        normal: image(&|_, normal| {
+        outer: image(3.0, &|dab, _| dab.outer.extend(dab.opacity).to_array()),
+        normal: image(1.0, &|_, normal| {
             // 128 is 0, as in glTF: the shader takes 255 steps from −1 to 1.
             (normal * (127.0 / 255.0) + Vec3::splat(128.0 / 255.0))
                 .extend(1.0)
                 .to_array()
         }),
-        inner: image(&|dab, _| dab.inner.extend(1.0).to_array()),
-        layers: image(&|dab, _| dab.depths),
+        inner: image(5.0, &|dab, _| dab.inner.extend(1.0).to_array()),
+        layers: image(5.0, &|dab, _| dab.depths),
     }
 }
