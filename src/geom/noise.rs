@@ -21,12 +21,11 @@ pub struct Cells {
 
 /// Well mixed bits of a lattice point.
 pub fn hash(cell: [i32; 3], seed: u32) -> u32 {
-    let mut h = seed ^ 0x9e37_79b9;
-    for c in cell {
-        h ^= (c as u32).wrapping_mul(0x85eb_ca6b);
-        h = h.rotate_left(13).wrapping_mul(5).wrapping_add(0xe654_6b64);
-    }
-    mix(h)
+    let [x, y, z] = cell.map(|c| c as u32);
+    mix(x.wrapping_mul(0x8da6_b343)
+        ^ y.wrapping_mul(0xd816_3841)
+        ^ z.wrapping_mul(0xcb1a_b31f)
+        ^ seed.wrapping_mul(0x9e37_79b9))
 }
 
 /// A bijection of 32 bits in which each input bit moves about half of the output bits.

@@ -51,8 +51,8 @@ impl Brush {
 
     /// What the tissue has at a place.
     pub fn dab(&self, site: &Site) -> Dab {
-        let large = self.large.near(site.place);
-        let fine = self.fine.near(site.place);
+        let large = self.large.cover(site.place);
+        let fine = self.fine.cover(site.place);
         let mut dab = match self.tissue {
             Tissue::Liver => liver::dab(site, large, fine),
             Tissue::Heart => heart::dab(site, large, fine),
