@@ -21,12 +21,11 @@ pub struct Cells {
 
 /// Well mixed bits of a lattice point.
 pub fn hash(cell: [i32; 3], seed: u32) -> u32 {
-    let mut h = seed ^ 0x9e37_79b9;
-    for c in cell {
-        h ^= (c as u32).wrapping_mul(0x85eb_ca6b);
-        h = h.rotate_left(13).wrapping_mul(5).wrapping_add(0xe654_6b64);
-    }
-    mix(h)
+    let [x, y, z] = cell.map(|c| c as u32);
+    mix(x.wrapping_mul(0x8da6_b343)
+        ^ y.wrapping_mul(0xd816_3841)
+        ^ z.wrapping_mul(0xcb1a_b31f)
+        ^ seed.wrapping_mul(0x9e37_79b9))
 }
 
 /// A bijection of 32 bits in which each input bit moves about half of the output bits.
@@ -46,9 +45,7 @@ pub fn unit(h: u32) -> f32 {
 /// Smooth noise in about `[-1, 1]`, zero at every lattice point, with continuous second
 /// derivatives.
 pub fn gradient(p: Vec3, seed: u32) -> f32 {
-    let base = p.floor();
-    let f = p - base;
-    let cell = [base.x as i32, base.y as i32, base.z as i32];
+    let (cell, f) = split(p);
     let fade = f * f * f * (f * (f * 6.0 - 15.0) + 10.0);
     let corner = |dx: i32, dy: i32, dz: i32| {
         let h = hash(
@@ -82,8 +79,7 @@ pub fn fractal(p: Vec3, octaves: u32, seed: u32) -> f32 {
 
 /// Distances to the feature points, one in each lattice cell.
 pub fn cellular(p: Vec3, seed: u32) -> Cells {
-    let base = p.floor();
-    let cell = [base.x as i32, base.y as i32, base.z as i32];
+    let (cell, f) = split(p);
     let mut found = Cells {
         nearest: f32::MAX,
         second: f32::MAX,
@@ -105,8 +101,8 @@ pub fn cellular(p: Vec3, seed: u32) -> Cells {
                     unit(mix(h ^ 0x68bc_21eb)),
                     unit(mix(h ^ 0x02e5_be93)),
                 );
-                let feature = base + Vec3::new(dx as f32, dy as f32, dz as f32) + inside;
-                let squared = feature.distance_squared(p);
+                let feature = Vec3::new(dx as f32, dy as f32, dz as f32) + inside;
+                let squared = feature.distance_squared(f);
                 if squared < found.nearest {
                     found.second = found.nearest;
                     found.nearest = squared;
@@ -131,6 +127,16 @@ pub fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
 /// `a` at `t = 0`, `b` at `t = 1`.
 pub fn lerp(a: f32, b: f32, t: f32) -> f32 {
     a + (b - a) * t
+}
+
+/// The lattice cell of `p` and the place in it. By truncation, since `floor` is a call to the
+/// maths library on processors without SSE4.1.
+fn split(p: Vec3) -> ([i32; 3], Vec3) {
+    let cell = p.to_array().map(|x| {
+        let whole = x as i32;
+        whole - i32::from(x < whole as f32)
+    });
+    (cell, p - Vec3::from(cell.map(|n| n as f32)))
 }
 
 /// Dot product of `offset` with one of the twelve edge directions of a cube, picked by `h`.

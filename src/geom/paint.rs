@@ -160,23 +160,181 @@ fn maps(size_px: u32, dabs: &[Option<Dab>], normals: &[Vec3]) -> TissueMaps {
         inner: mean(|dab| dab.inner),
         depths: [0.1, 0.4, 0.5, 1.0],
     };
-    let image = |texel: &dyn Fn(&Dab, Vec3) -> [f32; 4]| {
+    // Colours and depths are rounded to every `step`-th value: noise hides it, and the pictures
+    // pack into half the bytes.
+    let image = |step: f32, texel: &dyn Fn(&Dab, Vec3) -> [f32; 4]| {
         RgbaImage::from_fn(size_px, size_px, |x, y| {
             let at = (y * size_px + x) as usize;
             let channels = texel(dabs[at].as_ref().unwrap_or(&empty), normals[at]);
-            Rgba(channels.map(|c| (c.clamp(0.0, 1.0) * 255.0 + 0.5) as u8))
+            Rgba(channels.map(|c| {
+                let rounded = (c.clamp(0.0, 1.0) * 255.0 / step + 0.5) as u8;
+                (f32::from(rounded) * step) as u8
+            }))
         })
     };
     TissueMaps {
         size_px,
-        outer: image(&|dab, _| dab.outer.extend(dab.opacity).to_array()),
-        normal: image(&|_, normal| {
+        outer: image(3.0, &|dab, _| dab.outer.extend(dab.opacity).to_array()),
+        normal: image(1.0, &|_, normal| {
             // 128 is 0, as in glTF: the shader takes 255 steps from −1 to 1.
             (normal * (127.0 / 255.0) + Vec3::splat(128.0 / 255.0))
                 .extend(1.0)
                 .to_array()
         }),
-        inner: image(&|dab, _| dab.inner.extend(1.0).to_array()),
-        layers: image(&|dab, _| dab.depths),
+        inner: image(5.0, &|dab, _| dab.inner.extend(1.0).to_array()),
+        layers: image(5.0, &|dab, _| dab.depths),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::unwrap::unwrap;
+    use glam::Vec2;
+
+    /// An octahedron cut finer three times and blown up to a ball of 10 cm.
+    fn ball() -> SurfaceMesh {
+        let mut points = vec![Vec3::X, Vec3::Y, Vec3::Z, -Vec3::X, -Vec3::Y, -Vec3::Z];
+        let mut triangles = vec![
+            [0, 1, 2],
+            [1, 3, 2],
+            [3, 4, 2],
+            [4, 0, 2],
+            [1, 0, 5],
+            [3, 1, 5],
+            [4, 3, 5],
+            [0, 4, 5_u32],
+        ];
+        for _ in 0..3 {
+            let mut finer = Vec::new();
+            for [a, b, c] in triangles {
+                let mut middle = |p: u32, q: u32| {
+                    let m = (points[p as usize] + points[q as usize]).normalize();
+                    points.iter().position(|&x| x == m).unwrap_or_else(|| {
+                        points.push(m);
+                        points.len() - 1
+                    }) as u32
+                };
+                let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+                finer.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+            }
+            triangles = finer;
+        }
+        let points: Vec<Vec3> = points.iter().map(|p| p.normalize() * 0.05).collect();
+        unwrap(&points, &triangles)
+    }
+
+    /// Colour between the texels, from 0 to 255.
+    fn fetch(image: &RgbaImage, uv: Vec2) -> Vec3 {
+        let at = uv * image.width() as f32 - 0.5;
+        let (base, f) = (at.floor(), at - at.floor());
+        let texel = |dx: f32, dy: f32| {
+            let most = image.width() as f32 - 1.0;
+            let p = (base + Vec2::new(dx, dy)).clamp(Vec2::ZERO, Vec2::splat(most));
+            let Rgba([r, g, b, _]) = *image.get_pixel(p.x as u32, p.y as u32);
+            Vec3::new(f32::from(r), f32::from(g), f32::from(b))
+        };
+        texel(0.0, 0.0)
+            .lerp(texel(1.0, 0.0), f.x)
+            .lerp(texel(0.0, 1.0).lerp(texel(1.0, 1.0), f.x), f.y)
+    }
+
+    /// Mean difference of the colours that the vertices of one point see.
+    fn seam(mesh: &SurfaceMesh, image: &RgbaImage) -> f32 {
+        let first = mesh.first_vertex_of_point();
+        let differences: Vec<f32> = (0..mesh.uvs.len())
+            .filter(|&v| first[mesh.point_of[v] as usize] != v as u32)
+            .map(|v| {
+                let other = first[mesh.point_of[v] as usize] as usize;
+                (fetch(image, mesh.uvs[v]) - fetch(image, mesh.uvs[other])).length()
+            })
+            .collect();
+        assert!(differences.len() > 10, "the map has seams");
+        differences.iter().sum::<f32>() / differences.len() as f32
+    }
+
+    #[test]
+    fn colours_agree_on_both_sides_of_a_seam() {
+        let mesh = ball();
+        for tissue in Tissue::ALL {
+            let maps = paint(&mesh, tissue, 512);
+            // Texels of both sides do not lie on each other, so noise of their size differs a
+            // little: measured 3 to 6 of 255.
+            for image in [&maps.outer, &maps.inner] {
+                let difference = seam(&mesh, image);
+                assert!(difference < 9.0, "{} {difference}", tissue.name());
+            }
+        }
+    }
+
+    #[test]
+    fn seam_check_rejects_a_picture_shifted_by_a_quarter() {
+        let mesh = ball();
+        let maps = paint(&mesh, Tissue::Heart, 256);
+        let shifted = RgbaImage::from_fn(256, 256, |x, y| {
+            *maps.outer.get_pixel((x + 64) % 256, (y + 32) % 256)
+        });
+        assert!(seam(&mesh, &shifted) > 2.0 * seam(&mesh, &maps.outer));
+    }
+
+    #[test]
+    fn layers_lie_below_each_other_everywhere() {
+        let mesh = ball();
+        for tissue in Tissue::ALL {
+            let maps = paint(&mesh, tissue, 128);
+            for Rgba(depths) in maps.layers.pixels() {
+                assert!(depths.is_sorted() && depths[0] > 0, "{depths:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn maps_have_the_same_bits_on_one_and_four_threads() {
+        let mesh = ball();
+        let on = |threads: usize| {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("threads can be started")
+                .install(|| paint(&mesh, Tissue::Liver, 128))
+        };
+        assert_eq!(on(1), on(4));
+    }
+
+    #[test]
+    fn painted_border_is_as_wide_as_promised() {
+        let mesh = ball();
+        let canvas = Canvas::new(&mesh, 256, 22.0);
+        let size = 256_i32;
+        let reach = GUTTER_PX as i32;
+        for uv in &mesh.uvs {
+            let at = (*uv * size as f32).as_ivec2();
+            for (dx, dy) in [(reach, 0), (-reach, 0), (0, reach), (0, -reach)] {
+                let (x, y) = (at.x + dx, at.y + dy);
+                if (0..size).contains(&x) && (0..size).contains(&y) {
+                    assert!(canvas.triangle((y * size + x) as u32).is_some());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn surfaces_of_any_unit_get_the_same_picture() {
+        let mesh = ball();
+        let mut large = mesh.clone();
+        // A power of two, so that scaling back is exact.
+        large.points.iter_mut().for_each(|p| *p *= 1024.0);
+        assert_eq!(
+            paint(&mesh, Tissue::Liver, 64),
+            paint(&large, Tissue::Liver, 64)
+        );
+    }
+
+    #[test]
+    fn surfaces_without_extent_or_triangles_are_painted_too() {
+        let maps = paint(&SurfaceMesh::default(), Tissue::Liver, 8);
+        assert_eq!(maps.normal.get_pixel(3, 3), &Rgba([128, 128, 255, 255]));
+        let spot = unwrap(&[Vec3::ONE; 3], &[[0, 1, 2]]);
+        assert_eq!(paint(&spot, Tissue::Heart, 8).size_px, 8);
     }
 }

@@ -1,13 +1,11 @@
 //! An even triangle mesh of a field's zero surface.
 //!
-//! Surface nets give a closed mesh; then points slide along the surface to the middle of their
-//! neighbours, return to the surface, and edges are turned where that makes angles less sharp.
-//!
-//! Source: Gibson, "Constrained Elastic Surface Nets", MICCAI 1998.
+//! A dual mesh over a grid is closed; then its points slide along the surface to the middle of
+//! their neighbours, return to the surface, and edges are turned where that makes angles less
+//! sharp.
 
+use super::dual::dual_mesh;
 use super::field::{METRES_PER_UNIT, Shape};
-use fast_surface_nets::ndshape::RuntimeShape;
-use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
 use glam::Vec3;
 
 /// Rounds of sliding; half of them already leave no triangle with an angle below 20 degrees on
@@ -20,7 +18,7 @@ const SLOPE_STEP: f32 = 0.01;
 
 /// Points [m] and triangles, counter-clockwise seen from outside.
 pub fn surface(shape: &Shape) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let (mut points, mut triangles) = nets(shape);
+    let (mut points, mut triangles) = dual_mesh(shape);
     for round in 0..ROUNDS {
         turn_edges(&points, &mut triangles);
         slide(shape, &mut points, &triangles);
@@ -34,90 +32,6 @@ pub fn surface(shape: &Shape) -> (Vec<Vec3>, Vec<[u32; 3]>) {
         *point *= METRES_PER_UNIT;
     }
     (points, triangles)
-}
-
-/// Surface nets on a grid over the shape's box.
-fn nets(shape: &Shape) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let cells = ((shape.high - shape.low) / shape.cell).ceil();
-    let size = [cells.x as u32 + 1, cells.y as u32 + 1, cells.z as u32 + 1];
-    let mut values = Vec::with_capacity((size[0] * size[1] * size[2]) as usize);
-    for z in 0..size[2] {
-        for y in 0..size[1] {
-            for x in 0..size[0] {
-                let at = shape.low + shape.cell * Vec3::new(x as f32, y as f32, z as f32);
-                values.push((shape.field)(at));
-            }
-        }
-    }
-    let mut buffer = SurfaceNetsBuffer::default();
-    surface_nets(
-        &values,
-        &RuntimeShape::<u32, 3>::new(size),
-        [0; 3],
-        size.map(|n| n - 1),
-        &mut buffer,
-    );
-    let mut points: Vec<Vec3> = buffer
-        .positions
-        .iter()
-        .map(|&p| shape.low + shape.cell * Vec3::from(p))
-        .collect();
-    let mut triangles: Vec<[u32; 3]> = buffer
-        .indices
-        .chunks_exact(3)
-        .map(|t| [t[0], t[1], t[2]])
-        .collect();
-    split_pinches(&mut points, &mut triangles);
-    (points, triangles)
-}
-
-/// Gives each fan of triangles its own point, where a cell of the grid holds two sheets of the
-/// surface and surface nets pinched them together, at a point or along an edge.
-fn split_pinches(points: &mut Vec<Vec3>, triangles: &mut [[u32; 3]]) {
-    let mut fans: Vec<Vec<u32>> = vec![Vec::new(); points.len()];
-    for (t, corners) in triangles.iter().enumerate() {
-        for &p in corners {
-            fans[p as usize].push(t as u32);
-        }
-    }
-    // Fans are told apart by the points as they were.
-    let triangles_before = triangles.to_vec();
-    for (p, mut waiting) in fans.into_iter().enumerate() {
-        let p = p as u32;
-        let mut first = true;
-        let all = waiting.clone();
-        // Sheets that touch along an edge are not joined there.
-        let sheet = |q: u32| {
-            let holds = |t: &&u32| triangles_before[**t as usize].contains(&q);
-            q != p && all.iter().filter(holds).count() == 2
-        };
-        while let Some(start) = waiting.pop() {
-            let mut fan = vec![start];
-            let mut next = 0;
-            while next < fan.len() {
-                let here = triangles_before[fan[next] as usize];
-                let (beside, apart): (Vec<u32>, Vec<u32>) = waiting.iter().partition(|&&t| {
-                    triangles_before[t as usize]
-                        .iter()
-                        .any(|&q| here.contains(&q) && sheet(q))
-                });
-                fan.extend(beside);
-                waiting = apart;
-                next += 1;
-            }
-            if !first {
-                for &t in &fan {
-                    for q in &mut triangles[t as usize] {
-                        if *q == p {
-                            *q = points.len() as u32;
-                        }
-                    }
-                }
-                points.push(points[p as usize]);
-            }
-            first = false;
-        }
-    }
 }
 
 /// The slope of the field.
@@ -262,30 +176,11 @@ mod tests {
                 .fold(f32::MAX, f32::min)
                 .to_degrees()
         };
-        let (points, triangles) = nets(&BALL);
+        let (points, triangles) = dual_mesh(&BALL);
         let before = sharpest(&points, &triangles);
         let (points, triangles) = surface(&BALL);
         let after = sharpest(&points, &triangles);
         assert!(before < 28.0, "the grid must leave work to do: {before}");
         assert!(after > 30.0, "{after}");
-    }
-
-    #[test]
-    fn two_sheets_that_touch_are_parted() {
-        // Two tetrahedra that share one edge, and two that share one point.
-        let tetrahedron = |a, b, c, d| [[a, c, b], [a, b, d], [b, c, d], [c, a, d]];
-        let places = |n: usize| (0..n).map(|i| Vec3::splat(i as f32)).collect::<Vec<_>>();
-        for (shared, second) in [(2, [0, 1, 4, 5]), (1, [0, 4, 5, 6])] {
-            let [a, b, c, d] = second;
-            let mut triangles = tetrahedron(0, 1, 2, 3).to_vec();
-            triangles.extend(tetrahedron(a, b, c, d));
-            let mut points = places(8 - shared);
-            split_pinches(&mut points, &mut triangles);
-            assert_eq!(points.len(), 8);
-            let mut first: Vec<u32> = triangles[..4].concat();
-            let second: Vec<u32> = triangles[4..].concat();
-            first.retain(|p| second.contains(p));
-            assert!(first.is_empty(), "still shared: {first:?}");
-        }
     }
 }

@@ -77,3 +77,67 @@ fn tilt(canvas: &Canvas, mesh: &SurfaceMesh, triangle: u32, along_u: f32, along_
     }
     (Vec3::Z - slope).normalize()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec2;
+
+    /// A square of 1 cm seen from +z, u to the right, v downwards, drawn out along u by `stretch`.
+    fn square(stretch: f32) -> SurfaceMesh {
+        let corner = |x: f32, y: f32| Vec3::new(0.01 * x * stretch, 0.01 * y, 0.0);
+        SurfaceMesh {
+            points: vec![
+                corner(0.0, 0.0),
+                corner(1.0, 0.0),
+                corner(1.0, 1.0),
+                corner(0.0, 1.0),
+            ],
+            point_of: vec![0, 1, 2, 3],
+            uvs: vec![
+                Vec2::new(0.0, 1.0),
+                Vec2::new(1.0, 1.0),
+                Vec2::new(1.0, 0.0),
+                Vec2::new(0.0, 0.0),
+            ],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        }
+    }
+
+    /// Normal in the middle of a ramp that rises by `rise` [cm] from one side to the other.
+    fn on_ramp(stretch: f32, rise: Vec2) -> Vec3 {
+        const SIZE: u32 = 16;
+        let mesh = square(stretch);
+        let canvas = Canvas::new(&mesh, SIZE, stretch.max(1.0));
+        let dabs: Vec<Option<Dab>> = (0..SIZE * SIZE)
+            .map(|texel| {
+                let uv = Vec2::new((texel % SIZE) as f32, (texel / SIZE) as f32) / SIZE as f32;
+                Some(Dab {
+                    relief: uv.dot(rise),
+                    ..Dab::default()
+                })
+            })
+            .collect();
+        normals(&canvas, &mesh, &dabs)[(SIZE * SIZE / 2 + SIZE / 2) as usize]
+    }
+
+    #[test]
+    fn ramp_that_rises_with_u_tilts_the_normal_back_by_its_slope() {
+        let expected = Vec3::new(-0.1, 0.0, 1.0).normalize();
+        assert!(on_ramp(1.0, Vec2::X * 0.1).distance(expected) < 1e-5);
+        // Drawn out to twice the length, the same rise is half as steep.
+        let expected = Vec3::new(-0.05, 0.0, 1.0).normalize();
+        assert!(on_ramp(2.0, Vec2::X * 0.1).distance(expected) < 1e-5);
+    }
+
+    #[test]
+    fn ramp_that_rises_with_v_tilts_the_normal_towards_smaller_v() {
+        let expected = Vec3::new(0.0, 0.1, 1.0).normalize();
+        assert!(on_ramp(1.0, Vec2::Y * 0.1).distance(expected) < 1e-5);
+    }
+
+    #[test]
+    fn flat_relief_has_the_normal_of_the_surface() {
+        assert_eq!(on_ramp(1.0, Vec2::ZERO), Vec3::Z);
+    }
+}

@@ -51,8 +51,8 @@ impl Brush {
 
     /// What the tissue has at a place.
     pub fn dab(&self, site: &Site) -> Dab {
-        let large = self.large.near(site.place);
-        let fine = self.fine.near(site.place);
+        let large = self.large.cover(site.place);
+        let fine = self.fine.cover(site.place);
         let mut dab = match self.tissue {
             Tissue::Liver => liver::dab(site, large, fine),
             Tissue::Heart => heart::dab(site, large, fine),
@@ -93,13 +93,20 @@ const fn rgb(r: u8, g: u8, b: u8) -> Vec3 {
     Vec3::new(r as f32 / 255.0, g as f32 / 255.0, b as f32 / 255.0)
 }
 
-/// Fat: lobules a few millimetres wide between thin seams. Gives colour and relief [cm].
+/// Fat: soft lobules of several sizes, hardly parted. Gives colour and relief [cm].
 fn fat(place: Vec3) -> (Vec3, f32) {
-    let bent = place + 0.12 * Vec3::splat(gradient(place / 0.5, 31));
-    let lobules = cellular(bent / 0.32, 32);
-    let seam = smoothstep(0.0, 0.22, lobules.second - lobules.nearest);
-    let shade = 0.5 + 0.5 * fractal(place / 0.8, 2, 33) + 0.25 * (lobules.shade - 0.5);
-    let colour = rgb(176, 118, 58).lerp(rgb(214, 172, 102), shade.clamp(0.0, 1.0));
-    let colour = rgb(150, 74, 44).lerp(colour, lerp(0.55, 1.0, seam));
-    (colour, 0.035 * seam * (1.0 - 0.5 * lobules.nearest))
+    let bent = place
+        + 0.10
+            * Vec3::new(
+                gradient(place / 0.33, 31),
+                gradient(place / 0.33, 34),
+                gradient(place / 0.33, 35),
+            );
+    let lobules = cellular(bent / 0.26, 32);
+    let round = 1.0 - lobules.nearest * lobules.nearest;
+    let seam = smoothstep(0.0, 0.3, lobules.second - lobules.nearest);
+    let shade = 0.5 + 0.6 * fractal(place / 0.5, 3, 33) + 0.22 * (lobules.shade - 0.5);
+    let colour = rgb(168, 112, 70).lerp(rgb(204, 166, 116), shade.clamp(0.0, 1.0));
+    let colour = rgb(150, 84, 58).lerp(colour, lerp(0.72, 1.0, seam));
+    (colour, 0.022 * round.max(0.0) + 0.008 * seam)
 }

@@ -7,7 +7,7 @@
 //! (growth towards auxin sources); Murray, PNAS 12 (1926) (radii; he has exponent 3, here 4, whose
 //! root is two square roots).
 
-use crate::geom::noise::{gradient, mix, unit};
+use crate::geom::noise::{gradient, lerp, mix, smoothstep, unit};
 use glam::Vec3;
 
 /// How a tree grows. Lengths in cm.
@@ -27,16 +27,21 @@ pub struct Habit {
     pub radius_max: f32,
     /// How much branches wander, as a share of a step.
     pub wander: f32,
+    /// Half widths of [`Cover::core`] and [`Cover::halo`], in radii.
+    pub core: f32,
+    pub halo: f32,
     pub seed: u32,
 }
 
-/// The nearest vessel to a place.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Near {
-    /// Distance from its axis [cm].
-    pub distance: f32,
-    /// Its radius there [cm].
-    pub radius: f32,
+/// How much of a place vessels take, each 0 to 1 and continuous over the surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cover {
+    /// 1 on the axis of a vessel, 0 from a little outside its wall on.
+    pub core: f32,
+    /// The same over a wider band beside it.
+    pub halo: f32,
+    /// The band beside large vessels only.
+    pub stem: f32,
 }
 
 /// Places on a surface with their normals.
@@ -51,15 +56,13 @@ pub struct Tree {
     nodes: Vec<Vec3>,
     parents: Vec<u32>,
     radii: Vec<f32>,
+    habit: Habit,
     grid: Grid,
 }
 
 const NONE: u32 = u32::MAX;
 /// Rounds of growth at most: 600 steps of 1.5 mm go round any organ.
 const ROUNDS_MAX: usize = 600;
-/// Vessels are found up to this many radii, plus [`MARGIN`], from their axis.
-const SPREAD: f32 = 4.0;
-const MARGIN: f32 = 0.06;
 
 impl Samples {
     /// About `count` places spread over the triangles by area.
@@ -152,9 +155,9 @@ impl Tree {
         growth.finish()
     }
 
-    /// The vessel whose wall is the nearest, if one is about as near as it is thick.
-    pub fn near(&self, p: Vec3) -> Option<Near> {
-        let mut best: Option<(f32, Near)> = None;
+    /// How much of the place `p` the vessels take.
+    pub fn cover(&self, p: Vec3) -> Cover {
+        let mut cover = Cover::default();
         self.grid.visit(p, 0.0, |node| {
             let node = node as usize;
             let parent = self.parents[node] as usize;
@@ -166,27 +169,18 @@ impl Tree {
             } else {
                 0.0
             };
-            let found = Near {
-                distance: p.distance(a + axis * t),
-                // Branches start at their own width, not at that of the stem.
-                radius: self.radii[node]
-                    + (self.radii[parent].min(1.3 * self.radii[node]) - self.radii[node])
-                        * (1.0 - t),
-            };
-            let outside = found.distance - found.radius;
-            if best.as_ref().is_none_or(|(least, _)| outside < *least) {
-                best = Some((outside, found));
-            }
+            let distance = p.distance(a + axis * t);
+            // Branches start at their own width, not at that of the stem.
+            let start = self.radii[parent].min(1.3 * self.radii[node]);
+            let radius = lerp(start, self.radii[node], t);
+            let core = smoothstep(self.habit.core * radius, 0.0, distance);
+            let halo = smoothstep(self.habit.halo * radius, 0.0, distance);
+            let large = smoothstep(0.4, 0.8, radius / self.habit.radius_max);
+            cover.core = cover.core.max(core);
+            cover.halo = cover.halo.max(halo);
+            cover.stem = cover.stem.max(halo * large);
         });
-        best.map(|(_, near)| near)
-    }
-}
-
-impl Near {
-    /// 1 on the axis, 0 from `widths` radii on, smooth.
-    pub fn cover(&self, widths: f32) -> f32 {
-        let t = (1.0 - self.distance / (widths * self.radius)).clamp(0.0, 1.0);
-        t * t * (3.0 - 2.0 * t)
+        cover
     }
 }
 
@@ -348,16 +342,22 @@ impl<'a> Growth<'a> {
         }
         let radii: Vec<f32> = fed
             .iter()
-            .map(|fed| (tip * fed.sqrt().sqrt()).min(self.habit.radius_max))
+            .zip(&children)
+            .map(|(fed, &children)| {
+                // The last piece of a branch tapers.
+                let share = if children == 0 { 0.4 } else { 1.0 };
+                (share * tip * fed.sqrt().sqrt()).min(self.habit.radius_max)
+            })
             .collect();
         let boxes: Vec<(Vec3, Vec3)> = (0..self.nodes.len())
             .map(|node| {
                 let (a, b) = (self.nodes[node], self.nodes[self.parents[node] as usize]);
-                let wide = SPREAD * radii[node] + MARGIN;
+                let wide = self.habit.halo.max(self.habit.core) * 1.3 * radii[node];
                 (a.min(b) - wide, a.max(b) + wide)
             })
             .collect();
         Tree {
+            habit: *self.habit,
             grid: Grid::of_boxes(&boxes, 0.25),
             nodes: self.nodes,
             parents: self.parents,
@@ -441,5 +441,94 @@ impl Grid {
                 visit(thing);
             }
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HABIT: Habit = Habit {
+        spacing: 0.6,
+        step: 0.15,
+        reach: 4.0,
+        enough: 0.35,
+        tip_radius: 0.03,
+        radius_max: 0.2,
+        wander: 0.4,
+        core: 1.2,
+        halo: 3.0,
+        seed: 1,
+    };
+
+    /// Places on a ball of 3 cm.
+    fn ball() -> Samples {
+        let turn = |k: u32| std::f32::consts::TAU * k as f32 / 48.0;
+        let at = |ring: u32, side: u32| {
+            let (polar, turn) = (0.5 * turn(ring), turn(side));
+            Vec3::new(
+                polar.sin() * turn.cos(),
+                polar.cos(),
+                polar.sin() * turn.sin(),
+            )
+        };
+        let normals: Vec<Vec3> = (0..49 * 48).map(|k| at(k / 48, k % 48)).collect();
+        let places: Vec<Vec3> = normals.iter().map(|n| *n * 3.0).collect();
+        let triangles: Vec<[u32; 3]> = (0..48 * 48)
+            .flat_map(|k| {
+                let (ring, side) = (k / 48, k % 48);
+                let v = |r: u32, s: u32| r * 48 + s % 48;
+                [
+                    [v(ring, side), v(ring, side + 1), v(ring + 1, side)],
+                    [v(ring, side + 1), v(ring + 1, side + 1), v(ring + 1, side)],
+                ]
+            })
+            .collect();
+        Samples::new(&places, &normals, &triangles, 8000)
+    }
+
+    #[test]
+    fn tree_reaches_everywhere_along_the_surface() {
+        let samples = ball();
+        let tree = Tree::grow(&samples, &[vec![Vec3::Y * 3.0]], &HABIT);
+        for node in &tree.nodes {
+            // Nodes lie on tangent planes of samples 2 mm apart, then are smoothed.
+            assert!((node.length() - 3.0).abs() < 0.05, "{node}");
+        }
+        for place in &samples.places {
+            let nearest = tree.nodes.iter().map(|n| n.distance(*place));
+            let nearest = nearest.fold(f32::MAX, f32::min);
+            // A place is at most a spacing from one that wanted a vessel.
+            assert!(
+                nearest < HABIT.spacing + HABIT.enough + HABIT.step,
+                "{nearest}"
+            );
+        }
+    }
+
+    #[test]
+    fn vessels_never_widen_away_from_the_root() {
+        let tree = Tree::grow(&ball(), &[vec![Vec3::Y * 3.0]], &HABIT);
+        for (node, &parent) in tree.parents.iter().enumerate() {
+            assert!(tree.radii[node] <= tree.radii[parent as usize]);
+        }
+        let root = tree.radii[0];
+        assert!(root > 2.0 * HABIT.tip_radius, "the stem is thick: {root}");
+    }
+
+    #[test]
+    fn cover_is_full_on_an_axis_and_nothing_far_from_it() {
+        let tree = Tree::grow(&ball(), &[vec![Vec3::Y * 3.0]], &HABIT);
+        let inner = tree.nodes[tree.nodes.len() / 2];
+        let cover = tree.cover(inner);
+        assert!(cover.core > 0.999 && cover.halo > 0.999, "{cover:?}");
+        assert_eq!(tree.cover(inner * 2.0), Cover::default());
+    }
+
+    #[test]
+    fn surface_without_places_has_no_vessels() {
+        let none = Samples::new(&[], &[], &[], 100);
+        let tree = Tree::grow(&none, &[vec![Vec3::ZERO]], &HABIT);
+        assert_eq!(tree.cover(Vec3::ZERO), Cover::default());
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Dab, Site, fat, rgb};
 use crate::geom::noise::{fractal, gradient, lerp, smoothstep};
-use crate::geom::paint::vessel::{Habit, Near};
+use crate::geom::paint::vessel::{Cover, Habit};
 use glam::Vec3;
 
 pub const LARGE: Habit = Habit {
@@ -13,6 +13,8 @@ pub const LARGE: Habit = Habit {
     tip_radius: 0.03,
     radius_max: 0.17,
     wander: 0.5,
+    core: 1.15,
+    halo: 3.6,
     seed: 201,
 };
 pub const FINE: Habit = Habit {
@@ -23,6 +25,8 @@ pub const FINE: Habit = Habit {
     tip_radius: 0.010,
     radius_max: 0.03,
     wander: 0.8,
+    core: 1.6,
+    halo: 1.6,
     seed: 202,
 };
 
@@ -36,13 +40,13 @@ fn fibre(normal: Vec3) -> Vec3 {
 
 /// Noise drawn out along the fibres, in about `[-1, 1]`.
 fn streaks(p: Vec3, along: Vec3, size: f32, seed: u32) -> f32 {
-    let sum: f32 = (-4..=4)
-        .map(|k| gradient((p + along * (size * 0.9 * k as f32)) / size, seed))
+    let sum: f32 = (-3..=3)
+        .map(|k| gradient((p + along * (size * 1.1 * k as f32)) / size, seed))
         .sum();
-    sum / 3.2
+    sum / 2.7
 }
 
-pub fn dab(site: &Site, large: Option<Near>, fine: Option<Near>) -> Dab {
+pub fn dab(site: &Site, large: Cover, fine: Cover) -> Dab {
     let p = site.place;
     let features = site.features;
     let along = fibre(site.normal);
@@ -51,10 +55,8 @@ pub fn dab(site: &Site, large: Option<Near>, fine: Option<Near>) -> Dab {
     let drift = fractal(p / 2.2, 3, 3);
     let blotch = fractal(p / 0.5, 3, 4);
 
-    let artery = large.map_or(0.0, |near| near.cover(1.15));
-    let beside = large.map_or(0.0, |near| near.cover(3.6));
-    let stem = large.map_or(0.0, |near| smoothstep(0.06, 0.13, near.radius));
-    let thread = fine.map_or(0.0, |near| near.cover(1.6));
+    let artery = large.core;
+    let thread = fine.core;
 
     let tone =
         (0.5 + 0.35 * drift + 0.15 * blotch + 0.24 * fibres + 0.16 * bundles).clamp(0.0, 1.0);
@@ -82,11 +84,15 @@ pub fn dab(site: &Site, large: Option<Near>, fine: Option<Near>) -> Dab {
     };
 
     // Fat lies in the grooves and along the large arteries.
-    let lumps = 0.45 * fractal(p / 0.7, 3, 7);
+    let lumps = 0.5 * fractal(p / 0.6, 4, 7);
     let groove = (features.fat).max(0.75 * site.hollow * smoothstep(0.3, 0.7, site.height));
-    let amount = smoothstep(0.42, 0.72, groove + 0.55 * stem * beside + lumps)
+    let amount = smoothstep(0.36, 0.9, groove + 0.5 * large.stem + lumps)
         * (1.0 - features.artery.max(features.vein));
-    let (colour, relief) = fat(p);
+    let (colour, relief) = if amount > 0.0 {
+        fat(p)
+    } else {
+        Default::default()
+    };
     dab.outer = dab.outer.lerp(colour, 0.92 * amount);
     dab.inner = dab.inner.lerp(rgb(156, 98, 50), amount);
     dab.opacity = lerp(dab.opacity, 0.93, amount);
@@ -98,7 +104,7 @@ pub fn dab(site: &Site, large: Option<Near>, fine: Option<Near>) -> Dab {
     let shown = artery * (1.0 - 0.35 * amount) * (1.0 - features.artery.max(features.vein));
     dab.outer = dab.outer.lerp(rgb(138, 34, 30), 0.85 * shown);
     dab.inner = dab.inner.lerp(rgb(120, 12, 14), 0.8 * artery);
-    dab.relief += 0.022 * artery * (1.0 - 0.3 * amount);
+    dab.relief += 0.013 * artery * (1.0 - 0.3 * amount);
     dab.depths[2] = lerp(dab.depths[2], 0.8, artery);
     great_vessels(site, &mut dab);
     dab
@@ -108,19 +114,22 @@ pub fn dab(site: &Site, large: Option<Near>, fine: Option<Near>) -> Dab {
 fn great_vessels(site: &Site, dab: &mut Dab) {
     let p = site.place;
     let features = site.features;
+    if features.artery.max(features.vein).max(features.lumen) <= 0.0 {
+        return;
+    }
     let grain = fractal(p / 0.4, 3, 8);
     let walls = [
         (
             features.artery,
-            rgb(176, 116, 98),
-            rgb(206, 160, 138),
+            rgb(166, 112, 96),
+            rgb(194, 150, 130),
             rgb(150, 70, 56),
         ),
         (
             features.vein,
-            rgb(98, 66, 84),
-            rgb(140, 104, 116),
-            rgb(70, 26, 44),
+            rgb(122, 82, 86),
+            rgb(162, 122, 118),
+            rgb(96, 40, 48),
         ),
     ];
     for (amount, dark, light, deep) in walls {

@@ -2,7 +2,8 @@
 
 use super::{Dab, Site, fat, rgb};
 use crate::geom::noise::{cellular, fractal, gradient, lerp, smoothstep};
-use crate::geom::paint::vessel::{Habit, Near};
+use crate::geom::organ::Features;
+use crate::geom::paint::vessel::{Cover, Habit};
 use glam::Vec3;
 
 pub const LARGE: Habit = Habit {
@@ -13,6 +14,8 @@ pub const LARGE: Habit = Habit {
     tip_radius: 0.045,
     radius_max: 0.24,
     wander: 0.45,
+    core: 1.25,
+    halo: 3.0,
     seed: 101,
 };
 pub const FINE: Habit = Habit {
@@ -23,10 +26,12 @@ pub const FINE: Habit = Habit {
     tip_radius: 0.014,
     radius_max: 0.035,
     wander: 0.7,
+    core: 1.6,
+    halo: 1.6,
     seed: 102,
 };
 
-pub fn dab(site: &Site, large: Option<Near>, fine: Option<Near>) -> Dab {
+pub fn dab(site: &Site, large: Cover, fine: Cover) -> Dab {
     let p = site.place;
     // Lobules: cells 1.3 mm wide, a pale rim round a dark centre, edges frayed.
     let bent = p + 0.03
@@ -41,9 +46,9 @@ pub fn dab(site: &Site, large: Option<Near>, fine: Option<Near>) -> Dab {
     let drift = fractal(p / 3.2, 3, 5);
     let blotch = fractal(p / 0.7, 3, 6);
 
-    let vein = large.map_or(0.0, |near| near.cover(1.25));
-    let halo = large.map_or(0.0, |near| near.cover(3.0));
-    let thread = fine.map_or(0.0, |near| near.cover(1.6));
+    let vein = large.core;
+    let halo = large.halo;
+    let thread = fine.core;
 
     let tone = (0.5 + 0.45 * drift + 0.28 * blotch + 0.16 * (lobule.shade - 0.5)).clamp(0.0, 1.0);
     let mut outer = rgb(86, 27, 22).lerp(rgb(138, 58, 42), tone);
@@ -81,6 +86,9 @@ pub fn dab(site: &Site, large: Option<Near>, fine: Option<Near>) -> Dab {
 fn neighbours(site: &Site, dab: &mut Dab, thread: f32) {
     let p = site.place;
     let features = site.features;
+    if features == Features::default() {
+        return;
+    }
     let grain = fractal(p / 0.35, 3, 10);
 
     let ligament = features.ligament * (0.75 + 0.25 * grain);
