@@ -1,13 +1,15 @@
 //! The surface on the GPU: what every pass reads, and the one upload a frame.
 
 use crate::geom::SurfaceMesh;
-use crate::gpu::{Gpu, GpuError, storage};
+use crate::gpu::{Entry, Gpu, GpuError, Table, storage};
 use glam::Vec3;
 
 /// Buffers of a surface. Only the positions change.
 pub struct MeshBuffers {
     /// Where each point lies now [m], `[vec4f; points]`, `w` is 1.
     pub positions: wgpu::Buffer,
+    /// The same, as a table for kernels that look up many.
+    pub position_table: Table,
     /// The point of each vertex, `[u32; vertices]`.
     pub point_of: wgpu::Buffer,
     /// Texture coordinate of each vertex, `[vec2f; vertices]`.
@@ -29,8 +31,10 @@ impl MeshBuffers {
     ///
     /// [`GpuError::BufferTooLarge`] if the adapter can't bind one of the lists.
     pub fn new(gpu: &Gpu, mesh: &SurfaceMesh) -> Result<Self, GpuError> {
+        let places = places(&mesh.points);
         Ok(Self {
-            positions: storage(gpu, "positions", &places(&mesh.points))?,
+            positions: storage(gpu, "positions", &places)?,
+            position_table: Table::new(gpu, "positions", Entry::Floats, &places)?,
             point_of: storage(gpu, "point of each vertex", &mesh.point_of)?,
             uvs: storage(gpu, "texture coordinates", &mesh.uvs)?,
             indices: storage(gpu, "triangles", mesh.triangles.as_flattened())?,
@@ -51,8 +55,10 @@ impl MeshBuffers {
             self.point_count as usize,
             "one position a point"
         );
+        let places = places(points);
         gpu.queue
-            .write_buffer(&self.positions, 0, bytemuck::cast_slice(&places(points)));
+            .write_buffer(&self.positions, 0, bytemuck::cast_slice(&places));
+        self.position_table.write(gpu, &places);
     }
 }
 
