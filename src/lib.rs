@@ -11,6 +11,7 @@
 //!
 //! `docs/ARCHITECTURE.md` draws the map; `tests/architecture.rs` keeps it true.
 
+pub mod app;
 pub mod geom;
 pub mod gpu;
 pub mod measure;

@@ -1,7 +1,7 @@
 //! The command line: parses it, calls the application, prints errors.
 
 use clap::{Args, Parser, Subcommand};
-use palpate::app::{self, AppError, Outcome, ReplayOptions};
+use palpate::app::{self, AppError, Outcome, ReplayOptions, WindowOptions};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -36,6 +36,9 @@ enum Command {
         /// Threads of the simulation; the result does not depend on it.
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
         threads: Option<u32>,
+        /// Writes the frame log of the session here when the window closes.
+        #[arg(long, value_name = "CSV")]
+        log: Option<PathBuf>,
     },
     /// Runs a scene's script without a window and writes pictures, log, states and a report.
     Replay(Replay),
@@ -100,6 +103,7 @@ fn parse_size(text: &str) -> Result<[u32; 2], String> {
 }
 
 fn main() -> ExitCode {
+    app::start_clock();
     let cli = Cli::parse();
     match run(cli.command) {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
@@ -113,12 +117,18 @@ fn main() -> ExitCode {
 
 fn run(command: Option<Command>) -> Result<Outcome, AppError> {
     match command {
-        None => app::window(app::DEFAULT_SCENE, &[], None),
+        None => app::window(&WindowOptions::default()),
         Some(Command::Window {
             scene,
             sets,
             threads,
-        }) => app::window(&scene, &sets.set, threads),
+            log,
+        }) => app::window(&WindowOptions {
+            scene,
+            sets: sets.set,
+            threads,
+            log,
+        }),
         Some(Command::Replay(replay)) => app::replay(&ReplayOptions {
             scene: replay.scene,
             sets: replay.sets.set,

@@ -2,7 +2,6 @@
 
 use super::session::Tick;
 use crate::gpu::PassTime;
-use crate::sim::ToolAction;
 use std::collections::VecDeque;
 
 /// Frames that are remembered.
@@ -29,19 +28,7 @@ impl Sample {
     /// Adds one time step.
     pub fn add_tick(&mut self, tick: &Tick) {
         self.sim_ms += tick.sim_ms;
-        self.force_n = tick
-            .report
-            .tool_forces_n
-            .iter()
-            .map(|force| force.length())
-            .fold(0.0, f32::max);
-        if tick
-            .tools
-            .iter()
-            .all(|tool| tool.action == ToolAction::Idle)
-        {
-            self.force_n = 0.0;
-        }
+        self.force_n = tick.force_max_n();
         self.volume_drift = tick.report.volume_drift;
         self.penetration_m = tick.report.penetration_max_m;
     }

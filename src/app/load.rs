@@ -106,6 +106,7 @@ pub fn body(scene: &Scene) -> Result<LoadedBody, AppError> {
         tets: lattice.tets,
         masses_kg: lattice.masses_kg,
         fixed,
+        fill: lattice.fill,
         embedding: lattice.embedding,
         triangles: mesh.point_triangles(),
         gravity_m_s2: section.gravity_m_s2,

@@ -11,6 +11,7 @@ mod load;
 mod orbit;
 mod panel;
 mod renderer;
+mod record;
 mod replay;
 mod script;
 mod session;
@@ -19,10 +20,15 @@ mod window;
 pub use assets::DEFAULT_SCENE;
 pub use check::check;
 pub use error::AppError;
+pub use record::start_clock;
 pub use replay::{ReplayOptions, replay};
 pub use session::{Marker, Session, Tick};
-pub use window::window;
+pub use window::{WindowOptions, window};
 
+/// Version number.
+const VERSION_NUMBER: &str = env!("CARGO_PKG_VERSION");
+/// Commit that was built.
+const VERSION_COMMIT: &str = env!("PALPATE_COMMIT");
 /// Version and commit.
 pub const VERSION: &str = concat!(
     env!("CARGO_PKG_VERSION"),

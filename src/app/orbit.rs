@@ -1,6 +1,6 @@
 //! The window's camera: it orbits a place, and turns a cursor into a ray.
 
-use glam::{Mat4, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
 /// A half-line in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -33,7 +33,7 @@ pub struct PanelState {
     /// The body sleeps.
     pub asleep: bool,
     /// Particles that were contained.
-    pub frozen_particles: u32,
+    pub frozen_particles: usize,
     /// The last thing that went wrong.
     pub error: Option<String>,
     /// The last thing that was done.

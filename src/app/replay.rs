@@ -1,14 +1,27 @@
 //! The replay: a scene's script without a window, and the files it leaves.
 
 use super::renderer::{Frame, Renderer};
-use super::session::{Session, Tick};
-use super::{AppError, Outcome, dump, load, record, thread_count};
+use super::record::{Recording, encode_png};
+use super::{AppError, Outcome, Session, dump, load, thread_count};
 use crate::gpu::Gpu;
-use crate::measure::{FrameRecord, write_png};
+use crate::measure::against::compare_runs;
+use crate::measure::files::{make_folder, write};
+use crate::measure::pictures::PictureTolerance;
+use crate::measure::states::Nearness;
 use crate::scene::Scene;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+/// Positions may differ by this much between machines: their fused multiply-adds differ, and a contact
+/// that closes a substep later moves a point by microns. A frame too late differs by a hundred times more.
+const NEARNESS: Nearness = Nearness::Within(2e-5);
+
+/// Software rasterizers of other versions round otherwise by a level or two, and move an outline by a pixel.
+const PICTURE_TOLERANCE: PictureTolerance = PictureTolerance {
+    channel: 8,
+    share: 0.002,
+};
 
 /// What `palpate replay` was told.
 #[derive(Clone, Debug)]
@@ -73,21 +86,37 @@ pub fn replay(options: &ReplayOptions) -> Result<Outcome, AppError> {
             "--dump writes what the shaders made, so it can't go with --no-render".to_owned(),
         ));
     }
-    let threads = thread_count(options.threads);
-    let mut run = Run::new(scene, threads, options)?;
+    let mut run = Run::new(scene, thread_count(options.threads), options)?;
     run.all_frames(options)?;
-    let recording = run.finish(options)?;
+    run.recording
+        .write(&options.out, &run.session, run.renderer.as_ref())?;
     match &options.against {
         None => Ok(Outcome::Done),
-        Some(folder) => record::compare(&recording, &options.out, folder),
+        Some(recorded) => compare(recorded, &options.out),
     }
+}
+
+/// Says how the run in `now` differs from the one in `recorded`.
+fn compare(recorded: &Path, now: &Path) -> Result<Outcome, AppError> {
+    let verdict = compare_runs(recorded, now, NEARNESS, PICTURE_TOLERANCE)?;
+    for line in &verdict.failures {
+        eprintln!("differs: {line}");
+    }
+    for line in &verdict.agreements {
+        eprintln!("agrees: {line}");
+    }
+    Ok(if verdict.agrees() {
+        Outcome::Done
+    } else {
+        Outcome::Differs
+    })
 }
 
 /// A replay under way.
 struct Run {
     session: Session,
     renderer: Option<Renderer>,
-    recording: record::Recording,
+    recording: Recording,
 }
 
 impl Run {
@@ -103,9 +132,9 @@ impl Run {
         } else {
             None
         };
-        crate::measure::create_folder(&options.out)?;
+        make_folder(&options.out)?;
         Ok(Self {
-            recording: record::Recording::new(&options.scene, &session, renderer.as_ref(), threads),
+            recording: Recording::new(options.scene.clone(), threads),
             session,
             renderer,
         })
@@ -117,26 +146,21 @@ impl Run {
             ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left")
                 .expect("a sound template"),
         );
-        if output.png_every > 0 || options.dumps.contains(&0) {
-            self.rest_frame(options)?;
-        }
-        let triangles = self.session.mesh.point_triangles();
-        self.recording.sample(&self.session, &triangles);
+        self.rest_frame(options)?;
         for frame in 1..=output.frames {
             let start = Instant::now();
             let tick = self.session.tick();
-            let drawn = self.draw(&tick)?;
-            let wall_ms = start.elapsed().as_secs_f32() * 1e3;
-            self.recording.add(self.record(frame, wall_ms, &tick, drawn.as_ref()));
-            if self.recording.wants_sample(frame, output.frames) {
-                self.recording.sample(&self.session, &triangles);
-            }
+            let drawn = self.draw()?;
+            self.recording.add(&self.session, start, &tick, drawn);
             let is_last = frame == output.frames;
+            if is_last || frame % sample_every(output.frames) == 0 {
+                self.recording.sample(&self.session);
+            }
             if is_last || (output.png_every > 0 && frame % output.png_every == 0) {
-                self.picture(&options.out, frame)?;
+                self.picture(&options.out)?;
             }
             if options.dumps.contains(&frame) {
-                self.dump(&options.out, frame)?;
+                self.dump(&options.out)?;
             }
             bar.inc(1);
         }
@@ -144,67 +168,53 @@ impl Run {
         Ok(())
     }
 
-    /// Frame 0, the body at rest: drawn and dumped, but not logged.
+    /// Frame 0, the body at rest: sampled, drawn and dumped where asked for, but not logged.
     fn rest_frame(&mut self, options: &ReplayOptions) -> Result<(), AppError> {
-        if let Some(renderer) = &mut self.renderer {
-            let orbit = renderer.scene_orbit(&self.session);
-            renderer.draw(self.session.points(), &orbit, &self.session.tools_now())?;
-            if self.session.scene.output.png_every > 0 {
-                self.picture(&options.out, 0)?;
-            }
-            if options.dumps.contains(&0) {
-                self.dump(&options.out, 0)?;
-            }
+        self.recording.sample(&self.session);
+        let wants_picture = self.session.scene.output.png_every > 0;
+        let wants_dump = options.dumps.contains(&0);
+        if wants_picture || wants_dump {
+            self.draw()?;
+        }
+        if wants_picture {
+            self.picture(&options.out)?;
+        }
+        if wants_dump {
+            self.dump(&options.out)?;
         }
         Ok(())
     }
 
-    fn draw(&mut self, tick: &Tick) -> Result<Option<Frame>, AppError> {
+    fn draw(&mut self) -> Result<Frame, AppError> {
         let Some(renderer) = &mut self.renderer else {
-            return Ok(None);
+            return Ok(Frame::default());
         };
         let orbit = renderer.scene_orbit(&self.session);
-        Ok(Some(renderer.draw(
-            self.session.points(),
-            &orbit,
-            &tick.tools,
-        )?))
+        renderer.draw(self.session.points(), &orbit, &self.session.visible_tools())
     }
 
-    fn record(
-        &self,
-        frame: u32,
-        wall_ms: f32,
-        tick: &Tick,
-        drawn: Option<&Frame>,
-    ) -> record::Row {
-        record::Row {
-            frame: FrameRecord::default(),
-            wall_ms,
-            tick: tick.clone(),
-            drawn: drawn.cloned(),
-            number: frame,
-        }
-    }
-
-    fn picture(&mut self, out: &Path, frame: u32) -> Result<(), AppError> {
+    fn picture(&mut self, out: &Path) -> Result<(), AppError> {
         if let Some(renderer) = &self.renderer {
-            let name = format!("frame-{frame:04}.png");
-            write_png(&out.join(&name), &renderer.picture()?)?;
-            self.recording.add_picture(name);
+            let file = out.join(format!("frame-{:04}.png", self.session.frame()));
+            let png = encode_png(&file, &renderer.picture()?)?;
+            write(&file, &png)?;
+            self.recording.add_picture(self.session.frame(), png);
         }
         Ok(())
     }
 
-    fn dump(&self, out: &Path, frame: u32) -> Result<(), AppError> {
+    fn dump(&self, out: &Path) -> Result<(), AppError> {
         match &self.renderer {
-            Some(renderer) => dump::write(
-                &out.join(format!("dump-{frame:04}")),
-                frame,
-                &self.session,
-                renderer,
-            ),
+            Some(renderer) => {
+                let folder = out.join(format!("dump-{:04}", self.session.frame()));
+                dump::write_dump(&folder, &self.session, renderer)
+            }
             None => Ok(()),
         }
     }
+}
+
+/// Frames between two samples of the states: about ten samples a replay, whatever its length.
+fn sample_every(frames: u32) -> u32 {
+    frames.div_ceil(10).max(1)
 }

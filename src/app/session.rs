@@ -5,6 +5,7 @@ use super::load::{self, LoadedBody};
 use super::script::Script;
 use crate::geom::SurfaceMesh;
 use crate::geom::ray::nearest_point;
+use crate::passes::tools::DrawnTool;
 use crate::scene::{MarkerSection, RestBox, Scene};
 use crate::sim::{Simulation, StepReport, ToolAction, ToolInput, ToolShape};
 use glam::Vec3;
@@ -29,7 +30,6 @@ pub struct Session {
     script: Script,
     markers: Vec<Marker>,
     frame: u32,
-    pool: rayon::ThreadPool,
 }
 
 /// What one time step did.
@@ -67,18 +67,16 @@ impl Session {
             setup,
             notes,
         } = load::body(&scene)?;
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .map_err(|e| AppError::Body(format!("{threads} threads can't be started: {e}")))?;
         let markers = scene
             .markers
             .iter()
             .map(|section| Marker::new(section, &mesh, &rest))
             .collect::<Result<_, _>>()?;
+        let mut simulation = Simulation::new(setup, scene.solver);
+        simulation.set_threads(Some(threads));
         Ok(Self {
             script: Script::new(&scene.tools, &mesh, &rest),
-            simulation: Simulation::new(setup, scene.solver),
+            simulation,
             script_plays: true,
             hand: None,
             frame: 0,
@@ -87,26 +85,54 @@ impl Session {
             rest,
             notes,
             markers,
-            pool,
         })
     }
 
     /// Runs one time step.
     pub fn tick(&mut self) -> Tick {
         self.frame += 1;
-        let mut tools = self.script.at(self.time_s());
-        if !self.script_plays {
-            tools.clear();
-        }
-        // The hand keeps its place in the list, so that letting go is a change of action.
-        tools.push(self.hand.unwrap_or(ABSENT_HAND));
+        let tools = self.tools_now();
         let start = Instant::now();
-        let report = self.pool.install(|| self.simulation.step(&tools));
+        let report = self.simulation.step(&tools);
         Tick {
             report,
             sim_ms: start.elapsed().as_secs_f32() * 1e3,
             tools,
         }
+    }
+
+    /// The tools as they are at this time: the script's, then the hand. Each keeps its place in the
+    /// list, so that letting go is a change of action.
+    pub fn tools_now(&self) -> Vec<ToolInput> {
+        let mut tools = self.script.at(self.time_s());
+        if !self.script_plays {
+            for tool in &mut tools {
+                tool.action = ToolAction::Idle;
+            }
+        }
+        tools.push(self.hand.unwrap_or(ABSENT_HAND));
+        tools
+    }
+
+    /// The tools that can be seen: those of a script that plays, and a hand that does something.
+    pub fn visible_tools(&self) -> Vec<DrawnTool> {
+        let hand = self.tools_now().len() - 1;
+        self.tools_now()
+            .into_iter()
+            .enumerate()
+            .filter(|&(index, tool)| {
+                if index == hand {
+                    tool.action != ToolAction::Idle
+                } else {
+                    self.script_plays
+                }
+            })
+            .map(|(_, tool)| DrawnTool {
+                tip_m: tool.position_m,
+                axis_m: tool.shape.axis_m(),
+                radius_m: tool.shape.radius_m(),
+            })
+            .collect()
     }
 
     /// Back to rest at time 0.

@@ -6,10 +6,11 @@ use super::orbit::{Orbit, Ray};
 use super::history::{History, Sample};
 use super::panel::{self, PanelAsk, PanelState};
 use super::renderer::Renderer;
+use super::record::{Recording, encode_png};
 use super::replay::{ReplayOptions, replay};
 use super::{AppError, Outcome, Session, thread_count};
 use crate::gpu::{Gpu, GpuError};
-use crate::measure::write_png;
+use crate::measure::files::write;
 use crate::sim::ToolAction;
 use egui_wgpu::ScreenDescriptor;
 use glam::Vec2;
@@ -26,13 +27,36 @@ use winit::window::{Window, WindowId};
 /// Time steps that one drawn frame may catch up with; beyond that the scene runs slower than the clock.
 const STEPS_A_FRAME_MAX: u32 = 4;
 
+/// What `palpate window` was told.
+#[derive(Clone, Debug)]
+pub struct WindowOptions {
+    /// Bundled scene or file.
+    pub scene: String,
+    /// `--set` overrides.
+    pub sets: Vec<String>,
+    /// Threads of the simulation.
+    pub threads: Option<u32>,
+    /// Where the frame log goes when the window closes.
+    pub log: Option<PathBuf>,
+}
+
+impl Default for WindowOptions {
+    fn default() -> Self {
+        Self {
+            scene: super::DEFAULT_SCENE.to_owned(),
+            sets: Vec::new(),
+            threads: None,
+            log: None,
+        }
+    }
+}
+
 /// Opens the window on a scene. Without a display it says so and replays the scene into `out`.
 ///
 /// # Errors
 ///
-/// [`AppError`] if the scene can't be loaded or the GPU can't be opened.
-pub fn window(scene: &str, sets: &[String], threads: Option<u32>) -> Result<Outcome, AppError> {
-    let session = Session::new(load::scene(scene, sets)?, thread_count(threads))?;
+/// [`AppError`] if the scene can't be loaded, the GPU can't be opened or the log can't be written.
+pub fn window(options: &WindowOptions) -> Result<Outcome, AppError> {
     let event_loop = if has_display() {
         EventLoop::new().ok()
     } else {
@@ -41,23 +65,27 @@ pub fn window(scene: &str, sets: &[String], threads: Option<u32>) -> Result<Outc
     let Some(event_loop) = event_loop else {
         eprintln!("palpate: no display, so the scene's script runs as a replay into out/");
         return replay(&ReplayOptions {
-            scene: scene.to_owned(),
-            sets: sets.to_vec(),
-            out: PathBuf::from("out"),
-            threads,
+            scene: options.scene.clone(),
+            sets: options.sets.clone(),
+            threads: options.threads,
             ..ReplayOptions::default()
         });
     };
+    let threads = thread_count(options.threads);
+    let session = Session::new(load::scene(&options.scene, &options.sets)?, threads)?;
     let mut app = App {
         session: Some(session),
-        scene_name: scene.to_owned(),
-        threads: thread_count(threads),
+        scene_name: options.scene.clone(),
+        threads,
         shown: None,
         failed: None,
     };
     event_loop
         .run_app(&mut app)
         .map_err(|e| AppError::Window(e.to_string()))?;
+    if let (Some(shown), Some(log)) = (&app.shown, &options.log) {
+        shown.recording.write_log(log)?;
+    }
     match app.failed {
         Some(error) => Err(error),
         None => Ok(Outcome::Done),
@@ -98,6 +126,8 @@ struct Shown {
     drag: Drag,
     state: PanelState,
     history: History,
+    /// Every frame since the window opened, for the log.
+    recording: Recording,
     threads: usize,
     /// Where the scene is drawn [physical px]: left, top, width, height.
     view_px: [u32; 4],
@@ -237,6 +267,7 @@ impl Shown {
             drag: Drag::Nothing,
             state,
             history: History::default(),
+            recording: Recording::new(scene_name.to_owned(), threads),
             threads,
             view_px: [0, 0, 1, 1],
             cursor_px: Vec2::ZERO,
@@ -411,8 +442,8 @@ impl Shown {
             wall_ms: 1e3 * seconds,
             ..Sample::default()
         };
-        let steps = self.due_steps(seconds);
-        for _ in 0..steps {
+        let mut last_tick = None;
+        for _ in 0..self.due_steps(seconds) {
             if let Some(hand) = &mut self.hand {
                 hand.sink(&self.state.hand, self.session.scene.solver.timestep_s);
             }
@@ -421,15 +452,18 @@ impl Shown {
             sample.add_tick(&tick);
             self.state.asleep = tick.report.asleep;
             self.state.frozen_particles = tick.report.frozen_particles;
+            last_tick = Some(tick);
         }
 
         let (jobs, textures, pixels_per_point) = self.panel()?;
-        let tools: Vec<_> = self.session.visible_tools();
-        sample.passes = self
+        let tools = self.session.visible_tools();
+        let drawn = self
             .renderer
             .draw(self.session.points(), &self.orbit, &tools)?;
-        if steps > 0 {
+        if let Some(tick) = last_tick {
+            sample.passes.clone_from(&drawn.passes);
             self.history.push(sample);
+            self.recording.add(&self.session, start, &tick, drawn);
         }
         if std::mem::take(&mut self.state.screenshot) {
             self.screenshot()?;
@@ -556,8 +590,8 @@ impl Shown {
                 break path;
             }
         };
-        let result = write_png(&path, &self.renderer.picture()?);
-        self.state.error = match result {
+        let png = encode_png(&path, &self.renderer.picture()?)?;
+        self.state.error = match write(&path, &png) {
             Ok(()) => {
                 self.state.message = format!("saved {}", path.display());
                 None
@@ -591,9 +625,11 @@ impl Shown {
                 }));
             }
         };
-        for (id, delta) in &textures.set {
-            self.egui_renderer
-                .update_texture(&self.gpu.device, &self.gpu.queue, *id, delta);
+        for (id, deltas) in &textures.set {
+            for delta in deltas {
+                self.egui_renderer
+                    .update_texture(&self.gpu.device, &self.gpu.queue, *id, delta);
+            }
         }
         let screen = ScreenDescriptor {
             size_in_pixels: [self.config.width, self.config.height],

@@ -79,6 +79,17 @@ pub fn read_texture_rgba16f(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<f3
     Ok(halves.into_iter().map(f32::from).collect())
 }
 
+/// Depths of a 32-bit float depth texture, row by row from the top.
+///
+/// # Errors
+///
+/// [`GpuError::ReadBack`] if the memory can't be mapped.
+pub fn read_texture_depth(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<f32>, GpuError> {
+    Ok(bytemuck::pod_collect_to_vec(&read_texture(
+        gpu, texture, 4,
+    )?))
+}
+
 fn read_texture(
     gpu: &Gpu,
     texture: &wgpu::Texture,

@@ -10,7 +10,7 @@ mod table;
 mod timer;
 
 pub use binding::{Binding, Kernel, bind, workgroups};
-pub use buffer::{read_buffer, read_texture_rgba8, read_texture_rgba16f, storage, uniform};
+pub use buffer::{read_buffer, read_texture_depth, read_texture_rgba8, read_texture_rgba16f, storage, uniform};
 pub use error::GpuError;
 pub use shader::{Wgsl, compile, join};
 pub use table::{Entry, Table};
@@ -34,6 +34,8 @@ pub struct Gpu {
     pub device: wgpu::Device,
     /// Where work is submitted.
     pub queue: wgpu::Queue,
+    /// The adapter itself, which a window asks what it can present.
+    pub raw_adapter: wgpu::Adapter,
     /// Name, backend and driver of the adapter, for logs and charts.
     pub adapter: String,
     /// Whether passes can be timed by the GPU itself.
@@ -74,10 +76,10 @@ impl Gpu {
             ..Default::default()
         }))
         .map_err(GpuError::NoAdapter)?;
-        Self::with_adapter(&adapter)
+        Self::with_adapter(adapter)
     }
 
-    fn with_adapter(adapter: &wgpu::Adapter) -> Result<Self, GpuError> {
+    fn with_adapter(adapter: wgpu::Adapter) -> Result<Self, GpuError> {
         let info = adapter.get_info();
         let has_timestamps = adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY);
         let offered = adapter.limits();
@@ -105,6 +107,7 @@ impl Gpu {
             timestamp_period_ns: queue.get_timestamp_period(),
             device,
             queue,
+            raw_adapter: adapter,
             adapter: format!("{} ({:?}, {})", info.name, info.backend, info.driver_info),
             has_timestamps,
         })

@@ -28,6 +28,8 @@ pub struct FrameRecord {
     pub tool_force_n: f32,
     /// Deepest penetration of tissue into a tool [m].
     pub penetration_m: f32,
+    /// Speed of the fastest particle [m/s].
+    pub speed_max_m_s: f32,
 }
 
 /// The passes with a record in any frame, in the order of their first.
@@ -58,6 +60,7 @@ pub fn write_frames_csv(file: &Path, records: &[FrameRecord]) -> Result<(), Meas
             "volume_drift",
             "tool_force_n",
             "penetration_m",
+            "speed_max_m_s",
         ];
         let mut header: Vec<String> = before.map(str::to_owned).to_vec();
         header.extend(passes.iter().map(|pass| format!("{pass}_gpu_ms")));
@@ -89,6 +92,7 @@ fn row(record: &FrameRecord, passes: &[&str]) -> Vec<String> {
         record.volume_drift.to_string(),
         record.tool_force_n.to_string(),
         record.penetration_m.to_string(),
+        record.speed_max_m_s.to_string(),
     ]);
     row
 }

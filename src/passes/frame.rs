@@ -5,6 +5,9 @@ use super::light_path::{LightPath, RefitCounts};
 use super::lightmap::{LightMap, uv_per_m};
 use super::maps::Maps;
 use super::mesh_buffers::MeshBuffers;
+use super::plane_carried::PlaneCarried;
+use super::plane_full::PlaneFull;
+use super::plane_incremental::PlaneIncremental;
 use super::shadow::Shadow;
 use super::surface::{NoShadow, Surface, SurfaceInputs, shadow_inputs};
 use super::tangents::Tangents;
@@ -26,8 +29,8 @@ const PATCH_EPSILON: f32 = 0.01;
 /// What a frame records, in order. A pass that the scene does not ask for is never built.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FramePlan {
-    /// Names of the passes, in the order they are recorded.
-    pub passes: Vec<&'static str>,
+    /// Name of each pass and its dispatches or draws, in the order they are recorded.
+    pub passes: Vec<(&'static str, u32)>,
     /// Names of passes that other scenes have and this one does not.
     pub left_out: Vec<&'static str>,
 }
@@ -39,32 +42,45 @@ impl FramePlan {
         let method = effective_method(scene);
         let shadow = scene.lights.iter().any(|light| light.shadow);
         let gooey = kind == SurfaceKind::Gooey;
-        let wanted = [
-            ("normals", true),
-            ("tangents", true),
-            ("planes-carried", method == Some(LightPathMethod::Carried)),
-            ("planes-full", method == Some(LightPathMethod::Full)),
-            ("planes-incremental", method == Some(LightPathMethod::Incremental)),
-            (Shadow::NAME, shadow),
-            (LightMap::NAME, gooey),
-            (LightMap::BLUR_NAME, gooey && scene.surface.blur_passes > 0),
-            ("plain", kind == SurfaceKind::Plain),
-            ("subsurface", kind == SurfaceKind::Subsurface),
-            ("gooey", gooey),
-            (Tools::NAME, !scene.tools.is_empty()),
-            (ToneMap::NAME, true),
+        let blurs = scene.surface.blur_passes;
+        let all = [
+            (Tangents::NAME, 2, true),
+            (PlaneCarried::NAME, 1, method == Some(LightPathMethod::Carried)),
+            (PlaneFull::NAME, 2, method == Some(LightPathMethod::Full)),
+            (
+                PlaneIncremental::NAME,
+                3,
+                method == Some(LightPathMethod::Incremental),
+            ),
+            (Shadow::NAME, 1, shadow),
+            (LightMap::NAME, 1, gooey),
+            (LightMap::BLUR_NAME, blurs, gooey && blurs > 0),
+            ("plain", 1, kind == SurfaceKind::Plain),
+            ("subsurface", 1, kind == SurfaceKind::Subsurface),
+            ("gooey", 1, gooey),
+            (Tools::NAME, 1, !scene.tools.is_empty()),
+            (ToneMap::NAME, 1, true),
         ];
-        let names = |is_wanted: bool| {
-            wanted
-                .iter()
-                .filter(|(_, wanted)| *wanted == is_wanted)
-                .map(|(name, _)| *name)
-                .collect()
-        };
         Self {
-            passes: names(true),
-            left_out: names(false),
+            passes: all
+                .iter()
+                .filter(|(_, _, wanted)| *wanted)
+                .map(|&(name, count, _)| (name, count))
+                .collect(),
+            left_out: all
+                .iter()
+                .filter(|(_, _, wanted)| !wanted)
+                .map(|&(name, _, _)| name)
+                .collect(),
         }
+    }
+
+    /// Dispatches or draws of the pass called `name` in a frame.
+    pub fn count_of(&self, name: &str) -> u32 {
+        self.passes
+            .iter()
+            .find(|(pass, _)| *pass == name)
+            .map_or(0, |&(_, count)| count)
     }
 }
 
@@ -297,4 +313,45 @@ fn targets(gpu: &Gpu, size: [u32; 2]) -> (Target, Target, Target) {
         Target::new(gpu, "depth", size, DEPTH_FORMAT),
         Target::new(gpu, "picture", size, PICTURE_FORMAT),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(text: &str) -> FramePlan {
+        let scene = format!(
+            "[body]\nshape = \"slab\"\nextent_m = [0.1, 0.1, 0.1]\n[[light]]\ntoward = [0.0, 1.0, 0.0]\n\
+             irradiance_w_m2 = [1.0, 1.0, 1.0]\n{text}"
+        );
+        FramePlan::for_scene(&toml::from_str(&scene).expect("a sound scene"))
+    }
+
+    fn names(plan: &FramePlan) -> Vec<&'static str> {
+        plan.passes.iter().map(|(name, _)| *name).collect()
+    }
+
+    #[test]
+    fn a_plain_scene_without_shadow_records_three_passes() {
+        let plan = plan("[surface]\nkind = \"plain\"");
+        assert_eq!(names(&plan), ["tangents", "plain", "tonemap"]);
+        assert!(plan.left_out.contains(&"planes-incremental"));
+    }
+
+    #[test]
+    fn only_a_marched_surface_has_planes() {
+        let method = "[light_path]\nmethod = \"full\"\n";
+        let marched = plan(&format!("{method}[surface]\nkind = \"subsurface\""));
+        assert_eq!(
+            names(&marched),
+            ["tangents", "planes-full", "subsurface", "tonemap"]
+        );
+        let gooey = plan(&format!("{method}[surface]\nkind = \"gooey\"\nblur_passes = 3"));
+        assert_eq!(
+            names(&gooey),
+            ["tangents", "lightmap", "blur", "gooey", "tonemap"]
+        );
+        assert_eq!(gooey.count_of("blur"), 3);
+        assert_eq!(gooey.count_of("planes-full"), 0);
+    }
 }

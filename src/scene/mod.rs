@@ -52,7 +52,7 @@ pub struct Scene {
     pub light_path: LightPathSection,
     /// What lights it. Without any, a key and a rim light.
     #[serde(
-        default = "default_lights",
+        default = "light::default_lights",
         rename = "light",
         skip_serializing_if = "Vec::is_empty"
     )]
@@ -177,12 +177,9 @@ impl Scene {
     fn check(&self, name: &str) -> Result<(), SceneError> {
         let mut c = Checker::new(name);
         self.body.check(&mut c);
-        let s = &self.solver;
-        c.range("solver.timestep_s", s.timestep_s, 1e-5, 0.1);
-        c.range("solver.substeps", s.substeps as f32, 1.0, 10_000.0);
-        c.range("solver.iterations", s.iterations as f32, 1.0, 10_000.0);
-        c.range("solver.youngs_modulus_pa", s.youngs_modulus_pa, 1.0, 1e9);
-        c.range("solver.poisson_ratio", s.poisson_ratio, 0.0, 0.499);
+        if let Some(problem) = self.solver.problem() {
+            c.problem("solver", &problem);
+        }
         for (index, tool) in self.tools.iter().enumerate() {
             tool.check(index, &mut c);
         }

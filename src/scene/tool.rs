@@ -64,8 +64,8 @@ pub struct Approach {
 pub struct Key {
     /// Time from the start of the scene [s].
     pub at_s: f32,
-    /// What the tool does from here on.
-    #[serde(default)]
+    /// What the tool does from here on; left out, it pushes.
+    #[serde(default = "push")]
     pub action: ToolAction,
     /// Middle of the tool [m].
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -82,6 +82,10 @@ pub struct Key {
     /// Added to the place, in longest extents of the body.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shift_share: Option<Vec3>,
+}
+
+fn push() -> ToolAction {
+    ToolAction::Push
 }
 
 impl ToolSection {

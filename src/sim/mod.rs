@@ -53,7 +53,7 @@ impl Method {
 
 /// Method, material and time step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct SolverParams {
     pub method: Method,
     /// Time one call of [`Simulation::step`] advances [s].

@@ -1,0 +1,52 @@
+//! `palpate check`: says what files hold, or what is wrong with them.
+
+use super::{AppError, Outcome, Session, load};
+use crate::geom::import::describe;
+use std::path::{Path, PathBuf};
+
+/// Describes each of `files` on standard output, what is wrong on standard error.
+///
+/// # Errors
+///
+/// [`AppError::Check`] if one can't be used; the others are still described.
+pub fn check(files: &[PathBuf]) -> Result<Outcome, AppError> {
+    let mut wrong = 0;
+    for file in files {
+        match one(file) {
+            Ok(text) => println!("{}", text.trim_end()),
+            Err(error) => {
+                eprintln!("{}: {error}", file.display());
+                wrong += 1;
+            }
+        }
+    }
+    if wrong > 0 {
+        return Err(AppError::Check { wrong });
+    }
+    Ok(Outcome::Done)
+}
+
+fn one(file: &Path) -> Result<String, AppError> {
+    let is_scene = file.extension().is_some_and(|ending| ending == "toml");
+    if !is_scene {
+        return Ok(describe(file)?);
+    }
+    let scene = load::scene(&file.display().to_string(), &[])?;
+    let title = scene.title.clone();
+    // The files it names are read too, and its script is placed.
+    let session = Session::new(scene, 1)?;
+    load::maps(&session.scene.body, &session.mesh)?;
+    let mut text = format!(
+        "{}: scene, \"{title}\"\n  surface of {} points and {} triangles, {} tetrahedra, {} tools",
+        file.display(),
+        session.mesh.points.len(),
+        session.mesh.triangles.len(),
+        session.tet_count(),
+        session.scene.tools.len(),
+    );
+    for note in &session.notes {
+        text.push_str("\n  ");
+        text.push_str(note);
+    }
+    Ok(text)
+}

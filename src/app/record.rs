@@ -1,0 +1,309 @@
+//! What a run leaves behind: the frame log, the summary, the trace, the states and the report.
+
+use super::renderer::{Frame, Renderer};
+use super::session::{Session, Tick};
+use super::{AppError, VERSION_COMMIT, VERSION_NUMBER};
+use crate::measure::log::{FrameRecord, write_frames_csv};
+use crate::measure::report::{self, replay_page};
+use crate::measure::states::States;
+use crate::measure::stats::Stats;
+use crate::measure::summary::{
+    MarkerSummary, MaxFinal, MeshCounts, RefitSummary, Summary, ToolSummary, passes, write_summary,
+};
+use crate::measure::trace::{Span, write_trace};
+use crate::passes::frame::FramePlan;
+use crate::sim::ToolAction;
+use image::RgbaImage;
+use std::io::Cursor;
+use std::path::Path;
+use std::sync::OnceLock;
+use std::time::Instant;
+
+/// Pictures that a report embeds; beyond that it takes them evenly.
+const REPORT_PICTURES_MAX: usize = 6;
+
+static PROCESS_START: OnceLock<Instant> = OnceLock::new();
+
+/// Remembers when the process started; called first in `main`.
+pub fn start_clock() {
+    process_start();
+}
+
+fn process_start() -> Instant {
+    *PROCESS_START.get_or_init(Instant::now)
+}
+
+/// Everything a run is asked for afterwards.
+pub struct Recording {
+    scene: String,
+    threads: usize,
+    records: Vec<FrameRecord>,
+    spans: Vec<Span>,
+    states: States,
+    pictures: Vec<(Vec<u8>, String)>,
+    moved: Vec<u32>,
+    inverted: Vec<usize>,
+    speed_final_m_s: f32,
+    frozen: usize,
+    finite: bool,
+    first_frame_s: f64,
+}
+
+impl Recording {
+    /// An empty recording of a run of `scene`.
+    pub fn new(scene: String, threads: usize) -> Self {
+        Self {
+            scene,
+            threads,
+            records: Vec::new(),
+            spans: Vec::new(),
+            states: States::default(),
+            pictures: Vec::new(),
+            moved: Vec::new(),
+            inverted: Vec::new(),
+            speed_final_m_s: 0.0,
+            frozen: 0,
+            finite: true,
+            first_frame_s: 0.0,
+        }
+    }
+
+    /// Adds the frame that began at `start` and has just ended.
+    pub fn add(&mut self, session: &Session, start: Instant, tick: &Tick, drawn: Frame) {
+        let wall_ms = start.elapsed().as_secs_f32() * 1e3;
+        if self.records.is_empty() {
+            self.first_frame_s = process_start().elapsed().as_secs_f64();
+        }
+        let mut passes_ms: Vec<(&'static str, f32)> = Vec::new();
+        for pass in &drawn.passes {
+            match passes_ms.iter_mut().find(|(name, _)| *name == pass.name) {
+                Some((_, ms)) => *ms += pass.gpu_ms,
+                None => passes_ms.push((pass.name, pass.gpu_ms)),
+            }
+        }
+        self.add_spans(start, wall_ms, tick, &drawn);
+        let gpu_ms: f32 = passes_ms.iter().map(|(_, ms)| ms).sum();
+        self.finite &= session.points().iter().all(|p| p.is_finite());
+        self.frozen = tick.report.frozen_particles;
+        self.moved.push(drawn.refit.moved);
+        self.inverted.push(tick.report.inverted_tets);
+        self.speed_final_m_s = tick.report.speed_max_m_s;
+        self.records.push(FrameRecord {
+            frame: session.frame(),
+            time_s: f64::from(session.frame()) * f64::from(session.scene.solver.timestep_s),
+            wall_ms,
+            sim_ms: tick.sim_ms,
+            passes_ms,
+            cpu_outside_ms: (wall_ms - tick.sim_ms - gpu_ms).max(0.0),
+            vertices_refitted: drawn.refit.refitted,
+            residual_rms: tick.report.residual_rms,
+            volume_drift: tick.report.volume_drift,
+            tool_force_n: tick.force_max_n(),
+            penetration_m: tick.report.penetration_max_m,
+            speed_max_m_s: tick.report.speed_max_m_s,
+        });
+    }
+
+    fn add_spans(&mut self, start: Instant, wall_ms: f32, tick: &Tick, drawn: &Frame) {
+        let start_us = (start - process_start()).as_secs_f64() * 1e6;
+        let mut span = |name: &'static str, category, from_ms: f32, ms: f32, thread| {
+            self.spans.push(Span {
+                name: name.into(),
+                category,
+                start_us: start_us + 1e3 * f64::from(from_ms),
+                duration_us: 1e3 * f64::from(ms),
+                thread,
+            });
+        };
+        span("frame", "frame", 0.0, wall_ms, 0);
+        span("simulation", "simulation", 0.0, tick.sim_ms, 1);
+        // The GPU has a clock of its own; its passes follow the simulation.
+        for pass in &drawn.passes {
+            span(pass.name, "gpu", tick.sim_ms + pass.start_ms, pass.gpu_ms, 2);
+        }
+    }
+
+    /// Samples the surface as it lies now.
+    pub fn sample(&mut self, session: &Session) {
+        let points = session.points().iter().map(|p| p.to_array());
+        self.states.push(session.frame(), points);
+    }
+
+    /// Keeps a picture for the report.
+    pub fn add_picture(&mut self, frame: u32, png: Vec<u8>) {
+        self.pictures.push((png, format!("frame {frame}")));
+    }
+
+    /// Writes only the frame log.
+    ///
+    /// # Errors
+    ///
+    /// [`AppError::File`] naming the file and the remedy.
+    pub fn write_log(&self, file: &Path) -> Result<(), AppError> {
+        Ok(write_frames_csv(file, &self.records)?)
+    }
+
+    /// Writes all files of a run into `out`.
+    ///
+    /// # Errors
+    ///
+    /// [`AppError::File`] naming the file and the remedy.
+    pub fn write(
+        mut self,
+        out: &Path,
+        session: &Session,
+        renderer: Option<&Renderer>,
+    ) -> Result<(), AppError> {
+        write_frames_csv(&out.join("frames.csv"), &self.records)?;
+        let threads = [(0, "frame"), (1, "simulation"), (2, "GPU")];
+        write_trace(&out.join("trace.json"), &self.spans, &threads)?;
+        self.states.write(out)?;
+        let summary = self.summary(session, renderer);
+        write_summary(&out.join("summary.json"), &summary)?;
+        let machine = report::machine();
+        replay_page(report::Replay {
+            summary: &summary,
+            records: &self.records,
+            machine: &machine,
+            pictures: thinned(std::mem::take(&mut self.pictures)),
+        })
+        .write(&out.join("report.html"))?;
+        self.say(&summary, out);
+        Ok(())
+    }
+
+    fn summary(&self, session: &Session, renderer: Option<&Renderer>) -> Summary {
+        let plan = FramePlan::for_scene(&session.scene);
+        let drift = self.records.iter().map(|r| f64::from(r.volume_drift));
+        let refitted = self.records.iter().map(|r| r.vertices_refitted);
+        let frames = self.records.len().max(1) as f64;
+        Summary {
+            scene: self.scene.clone(),
+            version: VERSION_NUMBER.to_owned(),
+            commit: VERSION_COMMIT.to_owned(),
+            adapter: renderer.map(|r| r.adapter().to_owned()),
+            threads: self.threads,
+            frames: self.records.len() as u32,
+            timestep_s: f64::from(session.scene.solver.timestep_s),
+            size: session.scene.output.size,
+            mesh: MeshCounts {
+                vertices: session.mesh.uvs.len(),
+                triangles: session.mesh.triangles.len(),
+                tets: session.tet_count(),
+            },
+            frame_ms: Stats::of(self.records.iter().map(|r| r.wall_ms)),
+            sim_ms: Stats::of(self.records.iter().map(|r| r.sim_ms)),
+            passes: passes(&self.records, |name| plan.count_of(name)),
+            left_out: plan.left_out.iter().map(|&name| name.to_owned()).collect(),
+            refit: RefitSummary {
+                method: session.scene.light_path.method.name().to_owned(),
+                vertices: session.mesh.points.len(),
+                refitted_mean: refitted.clone().map(f64::from).sum::<f64>() / frames,
+                refitted_max: refitted.max().unwrap_or(0),
+                moved_mean: self.moved.iter().map(|&m| f64::from(m)).sum::<f64>() / frames,
+            },
+            state_sha256: session.state_sha256(),
+            finite: self.finite && self.frozen == 0,
+            inverted_tets: MaxFinal {
+                max: self.inverted.iter().copied().max().unwrap_or(0) as u64,
+                last: self.inverted.last().copied().unwrap_or(0) as u64,
+            },
+            volume_drift: MaxFinal::of(drift),
+            speed_max_final_m_s: f64::from(self.speed_final_m_s),
+            tool: ToolSummary::of(&self.records),
+            markers: session
+                .markers()
+                .map(|(marker, now)| {
+                    MarkerSummary::new(
+                        marker.name.clone(),
+                        marker.rest_m.as_dvec3().to_array(),
+                        now.as_dvec3().to_array(),
+                    )
+                })
+                .collect(),
+            first_frame_s: self.first_frame_s,
+        }
+    }
+
+    /// One line for the one who waited.
+    fn say(&self, summary: &Summary, out: &Path) {
+        if let Some(frame) = &summary.frame_ms {
+            eprintln!(
+                "{} frames, p50 {:.1} ms, p95 {:.1} ms, largest force {:.2} N; see {}",
+                summary.frames,
+                frame.p50,
+                frame.p95,
+                summary.tool.force_max_n,
+                out.join("report.html").display()
+            );
+        }
+        if self.frozen > 0 {
+            eprintln!(
+                "{} particles went astray and were held where they were last sound: \
+                 use more substeps or a softer material",
+                self.frozen
+            );
+        }
+    }
+}
+
+impl Tick {
+    /// Size of the largest force on a tool that does something [N].
+    pub fn force_max_n(&self) -> f32 {
+        self.report
+            .tool_forces_n
+            .iter()
+            .zip(&self.tools)
+            .filter(|(_, tool)| tool.action != ToolAction::Idle)
+            .map(|(force, _)| force.length())
+            .fold(0.0, f32::max)
+    }
+}
+
+/// A picture as the bytes of a PNG.
+///
+/// # Errors
+///
+/// [`AppError::Map`] naming `file` if the encoder fails.
+pub fn encode_png(file: &Path, picture: &RgbaImage) -> Result<Vec<u8>, AppError> {
+    let mut bytes = Vec::new();
+    // Every pixel is opaque, so the file needs no alpha.
+    let rgb = image::DynamicImage::ImageRgba8(picture.clone()).into_rgb8();
+    rgb.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png)
+        .map_err(|e| AppError::Map {
+            path: file.display().to_string(),
+            message: e.to_string(),
+        })?;
+    Ok(bytes)
+}
+
+/// At most [`REPORT_PICTURES_MAX`] pictures, evenly chosen, the last one among them.
+fn thinned(pictures: Vec<(Vec<u8>, String)>) -> Vec<(Vec<u8>, String)> {
+    let count = pictures.len();
+    if count <= REPORT_PICTURES_MAX {
+        return pictures;
+    }
+    let wanted: Vec<usize> = (0..REPORT_PICTURES_MAX)
+        .map(|k| k * (count - 1) / (REPORT_PICTURES_MAX - 1))
+        .collect();
+    pictures
+        .into_iter()
+        .enumerate()
+        .filter(|(index, _)| wanted.contains(index))
+        .map(|(_, picture)| picture)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_report_takes_first_and_last_of_many_pictures() {
+        let pictures = (0..100).map(|k| (vec![k as u8], k.to_string())).collect();
+        let kept = thinned(pictures);
+        assert_eq!(kept.len(), REPORT_PICTURES_MAX);
+        assert_eq!(kept[0].1, "0");
+        assert_eq!(kept[REPORT_PICTURES_MAX - 1].1, "99");
+    }
+}

@@ -1,0 +1,186 @@
+//! A session drawn: the passes of its scene, their times, and what can be read back.
+
+use super::orbit::Orbit;
+use super::{AppError, Session, load};
+use crate::gpu::{
+    Gpu, PassTime, Timer, read_buffer, read_texture_depth, read_texture_rgba8,
+    read_texture_rgba16f,
+};
+use crate::passes::frame::FramePasses;
+use crate::passes::light_path::RefitCounts;
+use crate::passes::tools::DrawnTool;
+use crate::passes::view::View;
+use crate::scene::Scene;
+use glam::Vec3;
+use image::RgbaImage;
+
+/// Passes that are timed in a frame; a gooey scene with eight blurs has nineteen.
+const TIMED_PASSES_MAX: u32 = 32;
+
+/// The GPU side of a session.
+pub struct Renderer {
+    gpu: Gpu,
+    passes: FramePasses,
+    timer: Timer,
+}
+
+/// What drawing one frame took.
+#[derive(Clone, Debug, Default)]
+pub struct Frame {
+    /// GPU time of every pass.
+    pub passes: Vec<PassTime>,
+    /// How many planes were made anew.
+    pub refit: RefitCounts,
+}
+
+impl Renderer {
+    /// Builds the passes of the session's scene for pictures of `size` [px].
+    ///
+    /// # Errors
+    ///
+    /// [`AppError`] naming the texture or the pass that can't be used.
+    pub fn new(gpu: Gpu, session: &Session, size: [u32; 2]) -> Result<Self, AppError> {
+        let tissue = load::maps(&session.scene.body, &session.mesh)?;
+        let passes = FramePasses::new(
+            &gpu,
+            &session.scene,
+            &session.rest,
+            &session.mesh,
+            &tissue,
+            size,
+        )?;
+        Ok(Self {
+            timer: Timer::new(&gpu, TIMED_PASSES_MAX),
+            gpu,
+            passes,
+        })
+    }
+
+    /// Name of the adapter.
+    pub fn adapter(&self) -> &str {
+        &self.gpu.adapter
+    }
+
+    /// Width and height of the picture [px].
+    pub fn size(&self) -> [u32; 2] {
+        self.passes.size()
+    }
+
+    /// Makes the picture another size.
+    ///
+    /// # Errors
+    ///
+    /// [`AppError::Gpu`] if the adapter refuses it.
+    pub fn resize(&mut self, size: [u32; 2]) -> Result<(), AppError> {
+        Ok(self.passes.resize(&self.gpu, size)?)
+    }
+
+    /// Takes over changed knobs of the surface.
+    pub fn set_knobs(&mut self, scene: &Scene) {
+        self.passes.set_knobs(&scene.surface);
+    }
+
+    /// The camera that the scene asks for.
+    pub fn scene_orbit(&self, session: &Session) -> Orbit {
+        let camera = &session.scene.camera;
+        let (eye, target) = camera.eye_and_target(&session.rest);
+        Orbit::new(eye, target, camera.fov_y_deg.to_radians())
+    }
+
+    /// Draws one frame and waits for it.
+    ///
+    /// # Errors
+    ///
+    /// [`AppError::Gpu`] if its times or counts can't be read.
+    pub fn draw(
+        &mut self,
+        points: &[Vec3],
+        orbit: &Orbit,
+        tools: &[DrawnTool],
+    ) -> Result<Frame, AppError> {
+        let mut encoder = self.gpu.encoder();
+        self.timer.begin_frame();
+        let view = View {
+            eye: orbit.eye(),
+            target: orbit.target,
+            fov_y: orbit.fov_y,
+        };
+        self.passes.record(
+            &self.gpu,
+            points,
+            &view,
+            tools,
+            &mut encoder,
+            &mut self.timer,
+        );
+        self.timer.resolve(&mut encoder);
+        self.gpu.submit_and_wait(encoder);
+        Ok(Frame {
+            passes: self.timer.read(&self.gpu)?,
+            refit: self.passes.refit_counts(&self.gpu)?,
+        })
+    }
+
+    /// The finished picture, for the window to show.
+    pub fn picture_view(&self) -> &wgpu::TextureView {
+        &self.passes.picture.view
+    }
+
+    /// The finished picture.
+    ///
+    /// # Errors
+    ///
+    /// [`AppError::Gpu`] if it can't be read back.
+    pub fn picture(&self) -> Result<RgbaImage, AppError> {
+        let pixels = read_texture_rgba8(&self.gpu, &self.passes.picture.texture)?;
+        let [width, height] = self.size();
+        Ok(RgbaImage::from_raw(width, height, pixels).expect("as many pixels as the target has"))
+    }
+
+    /// Linear radiance before the tone map, RGB, row by row from the top.
+    ///
+    /// # Errors
+    ///
+    /// [`AppError::Gpu`] if it can't be read back.
+    pub fn radiance(&self) -> Result<Vec<f32>, AppError> {
+        let rgba = read_texture_rgba16f(&self.gpu, &self.passes.radiance.texture)?;
+        Ok(rgba
+            .chunks_exact(4)
+            .flat_map(|pixel| &pixel[..3])
+            .copied()
+            .collect())
+    }
+
+    /// Depth, 0 near to 1 far, row by row from the top.
+    ///
+    /// # Errors
+    ///
+    /// [`AppError::Gpu`] if it can't be read back.
+    pub fn depth(&self) -> Result<Vec<f32>, AppError> {
+        Ok(read_texture_depth(&self.gpu, &self.passes.depth.texture)?)
+    }
+
+    /// Normals a point, tangents a vertex, planes a point (none for the tangent plane).
+    ///
+    /// # Errors
+    ///
+    /// [`AppError::Gpu`] if they can't be read back.
+    pub fn geometry(&self) -> Result<DrawnGeometry, AppError> {
+        let read = |buffer: &wgpu::Buffer| read_buffer::<[f32; 4]>(&self.gpu, buffer);
+        Ok(DrawnGeometry {
+            normals: read(&self.passes.tangents.normals)?,
+            tangents: read(&self.passes.tangents.tangents)?,
+            planes: self.passes.light_path.planes().map(read).transpose()?,
+        })
+    }
+}
+
+/// What the shaders read of the surface, as it was last drawn.
+pub struct DrawnGeometry {
+    /// Unit normal of each point.
+    pub normals: Vec<[f32; 4]>,
+    /// Unit tangent of each vertex, handedness in the last.
+    pub tangents: Vec<[f32; 4]>,
+    /// Unit normal and signed offset [m] of each point's plane.
+    pub planes: Option<Vec<[f32; 4]>>,
+}
