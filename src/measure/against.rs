@@ -1,6 +1,6 @@
 //! A run against a recorded one: the states and every recorded picture.
 
-use super::files::MeasureError;
+use super::files::FileError;
 use super::pictures::{PictureTolerance, compare_pictures, read_png};
 use super::states::{Nearness, States, compare_states};
 use std::path::Path;
@@ -35,14 +35,14 @@ impl Verdict {
 ///
 /// # Errors
 ///
-/// [`MeasureError`] if a file of `recorded` cannot be read. One that is absent from `now` is a
+/// [`FileError`] if a file of `recorded` cannot be read. One that is absent from `now` is a
 /// failure in the verdict.
 pub fn compare_runs(
     recorded: &Path,
     now: &Path,
     nearness: Nearness,
     tolerance: PictureTolerance,
-) -> Result<Verdict, MeasureError> {
+) -> Result<Verdict, FileError> {
     let mut verdict = Verdict::default();
     let before = States::read(recorded)?;
     match States::read(now) {
@@ -66,8 +66,8 @@ pub fn compare_runs(
 }
 
 /// Names of the pictures of frames in `folder`, sorted.
-fn picture_names(folder: &Path) -> Result<Vec<String>, MeasureError> {
-    let failed = |source| MeasureError::Read {
+fn picture_names(folder: &Path) -> Result<Vec<String>, FileError> {
+    let failed = |source| FileError::Read {
         file: folder.to_owned(),
         source,
     };
@@ -85,7 +85,7 @@ fn picture_names(folder: &Path) -> Result<Vec<String>, MeasureError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::files::tests::Folder;
+    use super::super::files::{tests::Folder, write_png};
     use super::*;
     use image::RgbaImage;
 
@@ -100,7 +100,7 @@ mod tests {
         states.push(0, [[0.0, height, 0.0]]);
         states.write(&folder.0).unwrap();
         let picture = RgbaImage::from_pixel(4, 4, image::Rgba([shade; 4]));
-        picture.save(folder.0.join("frame-0000.png")).unwrap();
+        write_png(&folder.0.join("frame-0000.png"), &picture).unwrap();
         folder
     }
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// A file of a run that could not be written, read or understood.
 #[derive(Debug)]
-pub enum MeasureError {
+pub enum FileError {
     /// The system refused to write it.
     Write {
         /// The file.
@@ -32,7 +32,7 @@ pub enum MeasureError {
     },
 }
 
-impl fmt::Display for MeasureError {
+impl fmt::Display for FileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Write { file, source } => write!(
@@ -52,7 +52,7 @@ impl fmt::Display for MeasureError {
     }
 }
 
-impl std::error::Error for MeasureError {
+impl std::error::Error for FileError {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
             Self::Write { source, .. } | Self::Read { source, .. } => Some(source),
@@ -65,9 +65,9 @@ impl std::error::Error for MeasureError {
 ///
 /// # Errors
 ///
-/// [`MeasureError::Write`].
-pub fn make_folder(folder: &Path) -> Result<(), MeasureError> {
-    std::fs::create_dir_all(folder).map_err(|source| MeasureError::Write {
+/// [`FileError::Write`].
+pub fn create_folder(folder: &Path) -> Result<(), FileError> {
+    std::fs::create_dir_all(folder).map_err(|source| FileError::Write {
         file: folder.to_owned(),
         source,
     })
@@ -77,9 +77,9 @@ pub fn make_folder(folder: &Path) -> Result<(), MeasureError> {
 ///
 /// # Errors
 ///
-/// [`MeasureError::Read`].
-pub fn read(file: &Path) -> Result<Vec<u8>, MeasureError> {
-    std::fs::read(file).map_err(|source| MeasureError::Read {
+/// [`FileError::Read`].
+pub fn read(file: &Path) -> Result<Vec<u8>, FileError> {
+    std::fs::read(file).map_err(|source| FileError::Read {
         file: file.to_owned(),
         source,
     })
@@ -89,8 +89,8 @@ pub fn read(file: &Path) -> Result<Vec<u8>, MeasureError> {
 ///
 /// # Errors
 ///
-/// [`MeasureError::Write`]; what was in `file` before is then still there.
-pub fn write(file: &Path, bytes: &[u8]) -> Result<(), MeasureError> {
+/// [`FileError::Write`]; what was in `file` before is then still there.
+pub fn write(file: &Path, bytes: &[u8]) -> Result<(), FileError> {
     write_with(file, |out| out.write_all(bytes))
 }
 
@@ -98,12 +98,12 @@ pub fn write(file: &Path, bytes: &[u8]) -> Result<(), MeasureError> {
 ///
 /// # Errors
 ///
-/// [`MeasureError::Write`] if the system or `fill` fails; what was in `file` before is then still
+/// [`FileError::Write`] if the system or `fill` fails; what was in `file` before is then still
 /// there.
 pub fn write_with(
     file: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> Result<(), MeasureError> {
+) -> Result<(), FileError> {
     let mut name = file.file_name().unwrap_or_default().to_owned();
     name.push(format!(".{}.partial", std::process::id()));
     let partial = file.with_file_name(name);
@@ -116,18 +116,34 @@ pub fn write_with(
     filled.map_err(|source| {
         // If it cannot be removed either, the first error is the one worth telling.
         let _ = std::fs::remove_file(&partial);
-        MeasureError::Write {
+        FileError::Write {
             file: file.to_owned(),
             source,
         }
     })
 }
 
+/// Writes `picture` as PNG.
+///
+/// # Errors
+///
+/// [`FileError::Write`].
+pub fn write_png(file: &Path, picture: &image::RgbaImage) -> Result<(), FileError> {
+    let mut bytes = io::Cursor::new(Vec::new());
+    picture
+        .write_to(&mut bytes, image::ImageFormat::Png)
+        .map_err(|error| FileError::Write {
+            file: file.to_owned(),
+            source: io::Error::other(error),
+        })?;
+    write(file, bytes.get_ref())
+}
+
 /// Writes `values`, last index fastest, as a NumPy array of `shape`.
 ///
 /// # Errors
 ///
-/// [`MeasureError::Write`].
+/// [`FileError::Write`].
 ///
 /// # Panics
 ///
@@ -136,7 +152,7 @@ pub fn write_npy<T: npyz::AutoSerialize + Copy>(
     file: &Path,
     shape: &[u64],
     values: &[T],
-) -> Result<(), MeasureError> {
+) -> Result<(), FileError> {
     let count: u64 = shape.iter().product();
     assert_eq!(values.len() as u64, count, "an array fills its shape");
     write_with(file, |out| {
@@ -164,7 +180,7 @@ pub(super) mod tests {
             let number = NEXT.fetch_add(1, Ordering::Relaxed);
             let name = format!("palpate-measure-{}-{number}", std::process::id());
             let folder = std::env::temp_dir().join(name);
-            make_folder(&folder).expect("the temporary folder can be written");
+            create_folder(&folder).expect("the temporary folder can be written");
             Self(folder)
         }
 

@@ -1,6 +1,6 @@
 //! The frame log: one row a frame, speed and accuracy side by side.
 
-use super::files::{MeasureError, write_with};
+use super::files::{FileError, write_with};
 use std::path::Path;
 
 /// What one frame cost and how far off it was.
@@ -47,8 +47,8 @@ pub fn pass_names(records: &[FrameRecord]) -> Vec<&'static str> {
 ///
 /// # Errors
 ///
-/// [`MeasureError::Write`].
-pub fn write_frames_csv(file: &Path, records: &[FrameRecord]) -> Result<(), MeasureError> {
+/// [`FileError::Write`].
+pub fn write_frames_csv(file: &Path, records: &[FrameRecord]) -> Result<(), FileError> {
     let passes = pass_names(records);
     write_with(file, |out| {
         let mut table = csv::Writer::from_writer(out);

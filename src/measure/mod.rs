@@ -12,3 +12,6 @@ pub mod states;
 pub mod stats;
 pub mod summary;
 pub mod trace;
+
+pub use files::{FileError, create_folder, write_png};
+pub use log::FrameRecord;

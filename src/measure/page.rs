@@ -2,7 +2,7 @@
 //! and fit for print.
 
 use super::chart::escape;
-use super::files::{MeasureError, write};
+use super::files::{FileError, write};
 use base64::Engine;
 use std::fmt::Write;
 use std::path::Path;
@@ -116,8 +116,8 @@ impl Page {
     ///
     /// # Errors
     ///
-    /// [`MeasureError::Write`].
-    pub fn write(&self, file: &Path) -> Result<(), MeasureError> {
+    /// [`FileError::Write`].
+    pub fn write(&self, file: &Path) -> Result<(), FileError> {
         write(file, self.html().as_bytes())
     }
 }

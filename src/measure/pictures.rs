@@ -1,6 +1,6 @@
 //! Whether two pictures agree, pixel by pixel.
 
-use super::files::{MeasureError, read};
+use super::files::{FileError, read};
 use image::RgbaImage;
 use std::fmt;
 use std::path::Path;
@@ -99,11 +99,11 @@ pub fn compare_pictures(
 ///
 /// # Errors
 ///
-/// [`MeasureError`] if it cannot be read or is no PNG.
-pub fn read_png(file: &Path) -> Result<RgbaImage, MeasureError> {
+/// [`FileError`] if it cannot be read or is no PNG.
+pub fn read_png(file: &Path) -> Result<RgbaImage, FileError> {
     image::load_from_memory_with_format(&read(file)?, image::ImageFormat::Png)
         .map(|picture| picture.to_rgba8())
-        .map_err(|error| MeasureError::Content {
+        .map_err(|error| FileError::Content {
             file: file.to_owned(),
             problem: format!("{error}; record the picture again"),
         })

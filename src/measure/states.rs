@@ -3,7 +3,7 @@
 //! `states.bin` holds little-endian f32, `[frame][point][x, y, z]` in metres; `states.json` says
 //! which frames and how many points.
 
-use super::files::{MeasureError, read, write, write_with};
+use super::files::{FileError, read, write, write_with};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::io::Write;
@@ -64,8 +64,8 @@ impl States {
     ///
     /// # Errors
     ///
-    /// [`MeasureError::Write`].
-    pub fn write(&self, folder: &Path) -> Result<(), MeasureError> {
+    /// [`FileError::Write`].
+    pub fn write(&self, folder: &Path) -> Result<(), FileError> {
         write_with(&folder.join(BINARY), |out| {
             for number in self.positions.as_flattened() {
                 out.write_all(&number.to_le_bytes())?;
@@ -87,10 +87,10 @@ impl States {
     ///
     /// # Errors
     ///
-    /// [`MeasureError`] if one cannot be read or they do not fit together.
-    pub fn read(folder: &Path) -> Result<Self, MeasureError> {
+    /// [`FileError`] if one cannot be read or they do not fit together.
+    pub fn read(folder: &Path) -> Result<Self, FileError> {
         let file = folder.join(DESCRIPTION);
-        let content = |problem: String| MeasureError::Content {
+        let content = |problem: String| FileError::Content {
             file: file.clone(),
             problem: format!("{problem}; record the states again"),
         };

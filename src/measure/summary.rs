@@ -1,6 +1,6 @@
 //! `summary.json`: the run in one object, its keys fixed for scripts that read it.
 
-use super::files::{MeasureError, write};
+use super::files::{FileError, write};
 use super::log::{FrameRecord, pass_names};
 use super::stats::{Stats, percentile, sorted};
 use serde::Serialize;
@@ -198,8 +198,8 @@ pub fn passes(records: &[FrameRecord], count_of: impl Fn(&str) -> u32) -> Vec<Pa
 ///
 /// # Errors
 ///
-/// [`MeasureError::Write`].
-pub fn write_summary(file: &Path, summary: &Summary) -> Result<(), MeasureError> {
+/// [`FileError::Write`].
+pub fn write_summary(file: &Path, summary: &Summary) -> Result<(), FileError> {
     let mut text = serde_json::to_string_pretty(summary).expect("a summary has string keys");
     text.push('\n');
     write(file, text.as_bytes())

@@ -2,7 +2,7 @@
 //!
 //! Source: "Trace Event Format", complete events (`X`) and thread names (`M`).
 
-use super::files::{MeasureError, write_with};
+use super::files::{FileError, write_with};
 use serde::Serialize;
 use serde_json::json;
 use std::borrow::Cow;
@@ -32,12 +32,8 @@ pub struct Span {
 ///
 /// # Errors
 ///
-/// [`MeasureError::Write`].
-pub fn write_trace(
-    file: &Path,
-    spans: &[Span],
-    threads: &[(u32, &str)],
-) -> Result<(), MeasureError> {
+/// [`FileError::Write`].
+pub fn write_trace(file: &Path, spans: &[Span], threads: &[(u32, &str)]) -> Result<(), FileError> {
     let names = threads.iter().map(|(thread, name)| {
         json!({
             "ph": "M", "pid": 1, "tid": thread, "name": "thread_name", "args": { "name": name },

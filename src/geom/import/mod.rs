@@ -23,7 +23,7 @@ mod weld;
 pub use describe::describe;
 pub use error::{ImportError, ImportFault};
 pub use part::{FileParts, Part, TextureSource, read_parts};
-pub use picture::read_picture;
+pub use picture::{read_picture, read_picture_bytes};
 pub use surface::{ImportOptions, ImportedSurface, read_surface, read_surface_bytes};
 pub use uv::{UvState, uv_state};
 

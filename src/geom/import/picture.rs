@@ -3,30 +3,38 @@
 use super::error::{ImportError, ImportFault};
 use super::part::{TextureSource, read_bytes};
 use image::{DynamicImage, ImageReader, Limits};
-use std::borrow::Cow;
 use std::io::Cursor;
 use std::path::Path;
 
 /// Pictures with a longer side are refused [pixels]; the decoder bounds the memory besides.
 const SIDE_MAX: u32 = 16_384;
 
-/// Decodes a PNG or JPEG, told apart by its first bytes.
+/// The PNG or JPEG at `source`.
 ///
 /// # Errors
 ///
 /// [`ImportError`] if it cannot be read, is another format, is broken or too large.
 pub fn read_picture(source: &TextureSource) -> Result<DynamicImage, ImportError> {
-    let (bytes, file) = match source {
+    match source {
         TextureSource::File(file) => {
             let bytes = read_bytes(file).map_err(|fault| fault.of(file))?;
-            (Cow::Owned(bytes), file.as_path())
+            read_picture_bytes(file, &bytes)
         }
-        TextureSource::Embedded(bytes) => (Cow::Borrowed(bytes.as_slice()), Path::new("embedded")),
-    };
+        TextureSource::Embedded(bytes) => read_picture_bytes(Path::new("embedded"), bytes),
+    }
+}
+
+/// As [`read_picture`] for the `bytes` of a file that is inside the binary; `file` is its name. The
+/// format is told by the first bytes.
+///
+/// # Errors
+///
+/// As [`read_picture`].
+pub fn read_picture_bytes(file: &Path, bytes: &[u8]) -> Result<DynamicImage, ImportError> {
     let bad = |problem: String| ImportFault::malformed("picture", problem).of(file);
-    let format = image::guess_format(&bytes)
+    let format = image::guess_format(bytes)
         .map_err(|_| bad("neither PNG nor JPEG by its first bytes".to_owned()))?;
-    let mut reader = ImageReader::with_format(Cursor::new(&bytes), format);
+    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = Limits::default();
     limits.max_image_width = Some(SIDE_MAX);
     limits.max_image_height = Some(SIDE_MAX);
