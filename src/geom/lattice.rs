@@ -24,8 +24,9 @@ pub const TETS_MAX: usize = 2_000_000;
 const TETS_DEFAULT: f64 = 5_000.0;
 /// Cubes of the grid round the surface, kept or not; bounds the memory of the inside test.
 const GRID_CUBES_MAX: f64 = 8e6;
-/// A tetrahedron counts as at least this full: none is without mass or stiffness.
-const FILL_MIN: f32 = 0.05;
+/// A tetrahedron counts as at least this full. With less at the surface, its outermost tetrahedra
+/// are so soft that a push folds them over.
+const FILL_MIN: f32 = 0.2;
 
 /// A lattice and how the surface hangs in it.
 #[derive(Clone, Debug)]
@@ -34,7 +35,7 @@ pub struct Lattice {
     pub tets: TetMesh,
     /// Mass of each particle [kg]; all positive, together density times enclosed volume.
     pub masses_kg: Vec<f32>,
-    /// Share of each tetrahedron that is inside the surface, 0.05 to 1.
+    /// Share of each tetrahedron that is inside the surface, 0.2 to 1.
     pub fill: Vec<f32>,
     /// Where each surface point lies.
     pub embedding: Embedding,

@@ -116,6 +116,11 @@ impl Lanes3 {
     }
 
     #[inline(always)]
+    pub fn parts(self) -> [Lanes; 3] {
+        [self.x, self.y, self.z]
+    }
+
+    #[inline(always)]
     pub fn scaled(self, factor: Lanes) -> Self {
         Self {
             x: self.x * factor,

@@ -148,3 +148,57 @@ impl MassSpring {
         2.0 / highest.sqrt()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{geom::lattice::block_of_cells, sim::constraint};
+
+    #[test]
+    fn accelerations_are_the_negative_gradient_of_the_energy_over_the_mass() {
+        let (_, lattice) = block_of_cells(Vec3::new(0.02, 0.01, 0.01), [2, 1, 1]);
+        let mesh = &lattice.tets;
+        let all: Vec<u32> = (0..mesh.tets.len() as u32).collect();
+        let fill = vec![1.0; mesh.tets.len()];
+        let edges = edges_of(mesh, &all, &fill);
+        let modulus_pa = 1e4_f32;
+        let inverse_mass = 500.0_f32;
+        let mut places: Vec<Vec4> = (mesh.particles.iter().enumerate())
+            .map(|(i, &x)| {
+                let shake = Vec3::new((i % 3) as f32 - 1.0, (i % 5) as f32 - 2.0, (i % 2) as f32);
+                (x + 5e-4 * shake).extend(inverse_mass)
+            })
+            .collect();
+        places.push(Vec4::ZERO);
+        let mut gradient = vec![Vec3::ZERO; mesh.particles.len()];
+        for edge in &edges {
+            let x = edge.particles.map(|i| places[i as usize].truncate());
+            let c = constraint::distance(x, edge.rest_length_m).expect("the ends are apart");
+            for (end, particle) in edge.particles.into_iter().enumerate() {
+                let k = modulus_pa * edge.stiffness_per_modulus_m;
+                gradient[particle as usize] += k * c.value * c.gradient[end];
+            }
+        }
+        let mut model = MassSpring::new(mesh, &all, &fill);
+        let found = model.accelerations(&places, modulus_pa);
+        for (found, gradient) in found.iter().zip(&gradient) {
+            let expected = -inverse_mass * *gradient;
+            // Sums of some fifteen forces in f32.
+            let size = expected.length().max(1.0);
+            assert!(
+                found.distance(expected) < 1e-4 * size,
+                "{found} is not {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn coincident_particles_have_no_acceleration_that_is_not_finite() {
+        let (_, lattice) = block_of_cells(Vec3::splat(0.01), [1, 1, 1]);
+        let all: Vec<u32> = (0..5).collect();
+        let mut model = MassSpring::new(&lattice.tets, &all, &[1.0; 5]);
+        let places = vec![Vec3::ONE.extend(1.0); 9];
+        let found = model.accelerations(&places, 1e4);
+        assert!(found.iter().all(|a| *a == Vec3::ZERO));
+    }
+}

@@ -80,14 +80,15 @@ impl Particles {
     }
 
     /// Rolls every particle that is not finite back to where the step found it and holds it there.
-    /// Returns how many there were.
+    /// Returns how many of them were free before.
     pub fn freeze_if_not_finite(&mut self) -> usize {
         let mut frozen = 0;
         for (index, velocity) in self.velocities.iter_mut().enumerate() {
             if !(self.places[index].is_finite() && velocity.is_finite()) {
-                self.places[index] = self.finite[index].truncate().extend(0.0);
+                let last = self.finite[index];
+                self.places[index] = last.truncate().extend(0.0);
                 *velocity = Vec3::ZERO;
-                frozen += 1;
+                frozen += usize::from(last.w > 0.0);
             }
         }
         frozen

@@ -105,9 +105,9 @@ fn fill_of_a_ball_adds_up_to_its_volume() {
     let filled: f64 = (lattice.tets.tets.iter().zip(&lattice.fill))
         .map(|(&tet, &fill)| tet_volume_m3(&lattice.tets, tet) * f64::from(fill))
         .sum();
-    // 64 samples a cube are good for a few thousandths; the floor of 5 % adds about two hundredths.
+    // 64 samples a cube are good for a few thousandths; the floor of 20 % adds the rest.
     let ratio = filled / surface.volume_m3();
-    assert!((0.99..1.04).contains(&ratio), "{ratio}");
+    assert!((0.99..1.1).contains(&ratio), "{ratio}");
 }
 
 #[test]
