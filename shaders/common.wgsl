@@ -7,11 +7,6 @@ const MIN_LENGTH_SQUARED: f32 = 1e-30;
 // sin^2 of the angle between the UV axes below which they have no dual basis.
 const MIN_UV_SINE_SQUARED: f32 = 1e-4;
 
-// Where entry `i` of a table lies: tables have 1024 texels a row.
-fn entry(i: u32) -> vec2u {
-    return vec2u(i & 1023u, i >> 10u);
-}
-
 // A unit vector across the unit vector `n`: the axis least along `n`, made perpendicular.
 fn any_perpendicular(n: vec3f) -> vec3f {
     let along = abs(n);

@@ -18,9 +18,9 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var positions: texture_2d<f32>;
+@group(0) @binding(1) var<storage, read> positions: array<vec4f>;
 @group(0) @binding(2) var<storage, read> fan_start: array<u32>;
-@group(0) @binding(3) var fan_corners: texture_2d<u32>;
+@group(0) @binding(3) var<storage, read> fan_corners: array<vec2u>;
 @group(0) @binding(4) var<storage, read> rest_normals: array<vec4f>;
 @group(0) @binding(5) var<storage, read_write> normals: array<vec4f>;
 
@@ -30,21 +30,21 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if point >= params.point_count {
         return;
     }
-    let origin = textureLoad(positions, entry(point), 0).xyz;
+    let origin = positions[point].xyz;
     var area = vec3f(0.0);
     var edges = 0.0;
     let end = fan_start[point + 1u];
     for (var k = fan_start[point]; k < end; k += 1u) {
-        let corners = textureLoad(fan_corners, entry(k), 0).xy;
-        let e1 = textureLoad(positions, entry(corners.x), 0).xyz - origin;
-        let e2 = textureLoad(positions, entry(corners.y), 0).xyz - origin;
+        let corners = fan_corners[k];
+        let e1 = positions[corners.x].xyz - origin;
+        let e2 = positions[corners.y].xyz - origin;
         area += cross(e1, e2);
         edges += dot(e1, e1) + dot(e2, e2);
     }
     let smallest = MIN_AREA_SHARE * edges;
+    var n = rest_normals[point].xyz;
     if dot(area, area) > max(smallest * smallest, MIN_LENGTH_SQUARED) {
-        normals[point] = vec4f(normalize(area), 0.0);
-    } else {
-        normals[point] = rest_normals[point];
+        n = normalize(area);
     }
+    normals[point] = vec4f(n, 0.0);
 }

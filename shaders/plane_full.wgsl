@@ -15,11 +15,11 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var slots: texture_2d<f32>;
+@group(0) @binding(1) var<storage, read> slots: array<vec4f>;
 @group(0) @binding(2) var<storage, read> order: array<u32>;
 @group(0) @binding(3) var<storage, read> block_start: array<u32>;
 // leaf, members: bit i stands for slot 32 leaf + i
-@group(0) @binding(4) var blocks: texture_2d<u32>;
+@group(0) @binding(4) var<storage, read> blocks: array<vec2u>;
 @group(0) @binding(5) var<storage, read> normals: array<vec4f>;
 @group(0) @binding(6) var<storage, read_write> planes: array<vec4f>;
 
@@ -29,18 +29,17 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     if slot >= params.slot_count {
         return;
     }
-    let at = textureLoad(slots, entry(slot), 0).xyz;
+    let at = slots[slot].xyz;
     var count = 0u;
     var sum = vec3f(0.0);
     var squares = vec3f(0.0);
     var products = vec3f(0.0);
     let end = block_start[slot + 1u];
     for (var k = block_start[slot]; k < end; k += 1u) {
-        let block = textureLoad(blocks, entry(k), 0).xy;
+        let block = blocks[k];
         count += countOneBits(block.y);
         for (var members = block.y; members != 0u; members &= members - 1u) {
-            let member = 32u * block.x + firstTrailingBit(members);
-            let d = textureLoad(slots, entry(member), 0).xyz - at;
+            let d = slots[32u * block.x + firstTrailingBit(members)].xyz - at;
             sum += d;
             squares += d * d;
             products += d.xxy * d.yzz;

@@ -24,6 +24,11 @@ struct Params {
     pad0: u32,
 }
 
+struct Slot {
+    now: vec4f,
+    before: vec4f,
+}
+
 struct Patch {
     origin: vec3f,
     per_m: f32,
@@ -42,16 +47,14 @@ struct Frame {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-// where the sums have each slot, and where they are to have it
-@group(0) @binding(1) var committed: texture_2d<f32>;
-@group(0) @binding(2) var now: texture_2d<f32>;
-@group(0) @binding(3) var<storage, read> moved: array<u32>;
+@group(0) @binding(1) var<storage, read> slots: array<Slot>;
+@group(0) @binding(2) var<storage, read> moved: array<u32>;
 // leaf, members: bit i stands for slot 32 leaf + i
-@group(0) @binding(4) var blocks: texture_2d<u32>;
-@group(0) @binding(5) var<storage, read> normals: array<vec4f>;
-@group(0) @binding(6) var<storage, read_write> patches: array<Patch>;
-@group(0) @binding(7) var<storage, read_write> frame: Frame;
-@group(0) @binding(8) var<storage, read_write> planes: array<vec4f>;
+@group(0) @binding(3) var<storage, read> blocks: array<vec2u>;
+@group(0) @binding(4) var<storage, read> normals: array<vec4f>;
+@group(0) @binding(5) var<storage, read_write> patches: array<Patch>;
+@group(0) @binding(6) var<storage, read_write> frame: Frame;
+@group(0) @binding(7) var<storage, read_write> planes: array<vec4f>;
 
 fn rounded(d: vec3f) -> vec3i {
     return vec3i(round(d * params.quanta));
@@ -75,7 +78,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var member_count = 0u;
     var moved_count = 0u;
     for (var k = first_block; k < end_block; k += 1u) {
-        let block = textureLoad(blocks, entry(k), 0).xy;
+        let block = blocks[k];
         member_count += countOneBits(block.y);
         moved_count += countOneBits(block.y & moved[block.x]);
     }
@@ -92,19 +95,19 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var usable = 2u * moved_count < member_count;
     if usable {
         for (var k = first_block; k < end_block; k += 1u) {
-            let block = textureLoad(blocks, entry(k), 0).xy;
+            let block = blocks[k];
             for (var bits = block.y & moved[block.x]; bits != 0u; bits &= bits - 1u) {
-                let member = entry(32u * block.x + firstTrailingBit(bits));
-                let old_d = (textureLoad(committed, member, 0).xyz - origin) * per_m;
-                let new_d = (textureLoad(now, member, 0).xyz - origin) * per_m;
-                usable = usable && in_range(new_d);
-                sum += rounded(new_d) - rounded(old_d);
-                squares += rounded(new_d * new_d) - rounded(old_d * old_d);
-                products += rounded(new_d.xxy * new_d.yzz) - rounded(old_d.xxy * old_d.yzz);
+                let places = slots[32u * block.x + firstTrailingBit(bits)];
+                let before = (places.before.xyz - origin) * per_m;
+                let now = (places.now.xyz - origin) * per_m;
+                usable = usable && in_range(now);
+                sum += rounded(now) - rounded(before);
+                squares += rounded(now * now) - rounded(before * before);
+                products += rounded(now.xxy * now.yzz) - rounded(before.xxy * before.yzz);
             }
         }
     }
-    let at = textureLoad(now, entry(slot), 0).xyz;
+    let at = slots[slot].now.xyz;
     if !usable {
         origin = at;
         per_m = params.rest_per_m;
@@ -114,10 +117,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             products = vec3i(0);
             var all_in_range = true;
             for (var k = first_block; k < end_block; k += 1u) {
-                let block = textureLoad(blocks, entry(k), 0).xy;
+                let block = blocks[k];
                 for (var bits = block.y; bits != 0u; bits &= bits - 1u) {
-                    let member = entry(32u * block.x + firstTrailingBit(bits));
-                    let d = (textureLoad(now, member, 0).xyz - origin) * per_m;
+                    let place = slots[32u * block.x + firstTrailingBit(bits)].now.xyz;
+                    let d = (place - origin) * per_m;
                     all_in_range = all_in_range && in_range(d);
                     sum += rounded(d);
                     squares += rounded(d * d);

@@ -1,6 +1,6 @@
 // Which points moved, and which patches they are in.
 //
-//   moved:  |x - x_committed| > tolerance      then x_now = x, else x_now = x_committed
+//   moved:  |x - x_committed| > tolerance      then x_before = x_committed, x_committed = x
 //
 // Membership is symmetric, so the patches that a point is in are those of its own patch's members.
 // The lists of the 32 points of a leaf are joined beforehand: a leaf with a moved point marks all of
@@ -20,6 +20,11 @@ struct Params {
     pad1: u32,
 }
 
+struct Slot {
+    now: vec4f,
+    before: vec4f,
+}
+
 struct Frame {
     moved: atomic<u32>,
     refitted: atomic<u32>,
@@ -27,14 +32,12 @@ struct Frame {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var positions: texture_2d<f32>;
-// where the sums have each slot, and its point in w
-@group(0) @binding(2) var committed: texture_2d<f32>;
+@group(0) @binding(1) var<storage, read> positions: array<vec4f>;
+@group(0) @binding(2) var<storage, read> order: array<u32>;
 @group(0) @binding(3) var<storage, read> leaf_start: array<u32>;
 // leaf, members: the patches that points of a leaf are in
 @group(0) @binding(4) var<storage, read> leaf_blocks: array<vec2u>;
-// the same as `committed` for slots that do not move
-@group(0) @binding(5) var now: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(5) var<storage, read_write> slots: array<Slot>;
 @group(0) @binding(6) var<storage, read_write> moved: array<u32>;
 // zeros at the start of the frame
 @group(0) @binding(7) var<storage, read_write> frame: Frame;
@@ -49,12 +52,14 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     let count = min(32u, params.slot_count - first);
     var bits = 0u;
     for (var i = 0u; i < count; i += 1u) {
-        let old = textureLoad(committed, entry(first + i), 0);
-        let place = textureLoad(positions, entry(u32(old.w)), 0).xyz;
-        let d = place - old.xyz;
+        let slot = first + i;
+        let place = positions[order[slot]].xyz;
+        let committed = slots[slot].now.xyz;
+        let d = place - committed;
         if dot(d, d) > params.tolerance_squared_m2 {
             bits |= 1u << i;
-            textureStore(now, entry(first + i), vec4f(place, old.w));
+            slots[slot].before = vec4f(committed, 0.0);
+            slots[slot].now = vec4f(place, 0.0);
         }
     }
     moved[leaf] = bits;

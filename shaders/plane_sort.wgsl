@@ -16,13 +16,13 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var positions: texture_2d<f32>;
+@group(0) @binding(1) var<storage, read> positions: array<vec4f>;
 @group(0) @binding(2) var<storage, read> order: array<u32>;
-@group(0) @binding(3) var slots: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(3) var<storage, read_write> slots: array<vec4f>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     if id.x < params.slot_count {
-        textureStore(slots, entry(id.x), textureLoad(positions, entry(order[id.x]), 0));
+        slots[id.x] = positions[order[id.x]];
     }
 }

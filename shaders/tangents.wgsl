@@ -24,12 +24,12 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var positions: texture_2d<f32>;
+@group(0) @binding(1) var<storage, read> positions: array<vec4f>;
 @group(0) @binding(2) var<storage, read> normals: array<vec4f>;
 @group(0) @binding(3) var<storage, read> point_of: array<u32>;
 @group(0) @binding(4) var<storage, read> fan_start: array<u32>;
-@group(0) @binding(5) var fan_corners: texture_2d<u32>;
-@group(0) @binding(6) var uv_inverse: texture_2d<f32>;
+@group(0) @binding(5) var<storage, read> fan_corners: array<vec2u>;
+@group(0) @binding(6) var<storage, read> uv_inverse: array<vec4f>;
 @group(0) @binding(7) var<storage, read_write> tangents: array<vec4f>;
 @group(0) @binding(8) var<storage, read_write> uv_gradients: array<array<vec4f, 2>>;
 
@@ -57,16 +57,16 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     let point = point_of[vertex];
     let n = normals[point].xyz;
-    let origin = textureLoad(positions, entry(point), 0).xyz;
+    let origin = positions[point].xyz;
     var pu = vec3f(0.0);
     var pv = vec3f(0.0);
     var weight = 0.0;
     let end = fan_start[vertex + 1u];
     for (var k = fan_start[vertex]; k < end; k += 1u) {
-        let corners = textureLoad(fan_corners, entry(k), 0).xy;
-        let e1 = textureLoad(positions, entry(corners.x), 0).xyz - origin;
-        let e2 = textureLoad(positions, entry(corners.y), 0).xyz - origin;
-        let m = textureLoad(uv_inverse, entry(k), 0);
+        let corners = fan_corners[k];
+        let e1 = positions[corners.x].xyz - origin;
+        let e2 = positions[corners.y].xyz - origin;
+        let m = uv_inverse[k];
         let area = length(cross(e1, e2));
         if any(m != vec4f(0.0)) {
             pu += area * (m.x * e1 + m.y * e2);

@@ -13,7 +13,5 @@
 
 pub mod geom;
 pub mod gpu;
-pub mod measure;
 pub mod passes;
-pub mod scene;
 pub mod sim;

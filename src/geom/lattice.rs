@@ -7,11 +7,9 @@
 mod block;
 mod embed;
 mod inside;
-mod sphere;
 
-pub use block::{block, block_of_cells};
+pub use block::{Block, block};
 pub use embed::{boundary_triangles, embed};
-pub use sphere::sphere;
 
 use super::{Embedding, SurfaceMesh, TetMesh};
 use glam::DVec3;
@@ -20,8 +18,6 @@ use std::fmt;
 
 /// More tetrahedra than this are refused: no machine this runs on would finish a frame.
 pub const TETS_MAX: usize = 2_000_000;
-/// Tetrahedra if nothing else is asked for.
-const TETS_DEFAULT: f64 = 5_000.0;
 /// Cubes of the grid round the surface, kept or not; bounds the memory of the inside test.
 const GRID_CUBES_MAX: f64 = 8e6;
 /// A tetrahedron counts as at least this full: none is without mass or stiffness.
@@ -139,7 +135,7 @@ impl Lattice {
         }
 
         let inside = Inside::of(surface, &grid);
-        let volume_m3 = enclosed_volume_m3(surface, inside.volume_m3, f64::from(cell_m) / longest);
+        let volume_m3 = enclosed_volume_m3(surface, inside.volume_m3);
         // Thinner than a millionth of its box: rounding, no tissue.
         if volume_m3 <= 1e-6 * longest.powi(3) {
             return Err(LatticeError::NoVolume);
@@ -170,13 +166,7 @@ impl Lattice {
 ///
 /// Never below the smallest edge that [`Lattice::around`] takes; 0 for an empty surface.
 pub fn default_cell_m(surface: &SurfaceMesh) -> f32 {
-    cell_for_tets_m(surface, TETS_DEFAULT) as f32
-}
-
-/// A cube edge [m] that fills `volume_m3` with about 5,000 tetrahedra, for shapes that need no cubes
-/// beyond their surface, such as boxes.
-pub fn cell_for_volume_m(volume_m3: f32) -> f32 {
-    (5.0 * volume_m3 / TETS_DEFAULT as f32).cbrt()
+    cell_for_tets_m(surface, 5_000.0) as f32
 }
 
 /// The edge [m] at which the lattice of `surface` has about `tets` tetrahedra.
@@ -224,11 +214,10 @@ fn smallest_cell_m(surface: &SurfaceMesh) -> f64 {
 /// Volume inside the surface [m³].
 ///
 /// The divergence theorem is exact for a closed surface without overlaps; where the columns of the
-/// inside test see another volume the surface is neither, and they are the better answer. Columns
-/// are a quarter of a cell wide, `cell_share` of the longest extent, and no better than that.
-fn enclosed_volume_m3(surface: &SurfaceMesh, columns_m3: f64, cell_share: f64) -> f64 {
+/// inside test see another volume the surface is neither, and they are the better answer.
+fn enclosed_volume_m3(surface: &SurfaceMesh, columns_m3: f64) -> f64 {
     let exact = surface.volume_m3().abs();
-    if (columns_m3 - exact).abs() < (0.02 + 0.2 * cell_share) * exact {
+    if (columns_m3 - exact).abs() < 0.02 * exact {
         exact
     } else {
         columns_m3

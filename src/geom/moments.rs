@@ -38,6 +38,16 @@ pub struct PatchSums {
     pub end_block: u32,
 }
 
+/// Where a slot's point lies and lay [m]. Mirror of `Slot` in `shaders/plane_moved.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct SlotPlaces {
+    /// As the sums have it, `w` is 0.
+    pub now: [f32; 4],
+    /// As the sums had it before the slot last moved, `w` is 0.
+    pub before: [f32; 4],
+}
+
 /// What one update did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Updated {
@@ -49,18 +59,15 @@ pub struct Updated {
 
 /// Planes of all points that follow moved points by their running moments.
 ///
-/// Twin of `shaders/plane_moved.wgsl`, `shaders/plane_incremental.wgsl` and
-/// `shaders/plane_commit.wgsl`.
+/// Twin of `shaders/plane_moved.wgsl` and `shaders/plane_incremental.wgsl`.
 #[derive(Clone, Debug)]
 pub struct RunningPlanes {
     /// Quanta a unit (and a squared unit): the finest power of two that no patch can overflow.
     pub quanta: f32,
     /// Units a metre when a patch is summed anew: the widest patch at rest is one unit wide.
     pub rest_per_m: f32,
-    /// Where the sums have each slot [m].
-    pub now: Vec<Vec3>,
-    /// Where they had it before it last moved [m].
-    pub before: Vec<Vec3>,
+    /// Places, by slot.
+    pub slots: Vec<SlotPlaces>,
     /// Which slots of each leaf moved in the last update.
     pub moved: Vec<u32>,
     /// Sums, by slot.
@@ -76,13 +83,20 @@ impl RunningPlanes {
             .map(|slot| patches.member_count(slot))
             .max()
             .unwrap_or(1);
-        let slots = patches.order.iter();
-        let places: Vec<Vec3> = slots.map(|&point| points[point as usize]).collect();
         let mut running = Self {
             quanta: quanta_for(largest),
             rest_per_m: 1.0 / widest_m(points, patches),
-            now: places.clone(),
-            before: places,
+            slots: patches
+                .order
+                .iter()
+                .map(|&point| {
+                    let place = points[point as usize].extend(0.0).to_array();
+                    SlotPlaces {
+                        now: place,
+                        before: place,
+                    }
+                })
+                .collect(),
             moved: vec![0; patches.leaf_count()],
             patches: Vec::new(),
             planes: normals.iter().map(|&n| Plane::tangent(n)).collect(),
@@ -122,14 +136,14 @@ impl RunningPlanes {
         patches: &Patches,
     ) -> Updated {
         assert_eq!(
-            self.now.len(),
+            self.slots.len(),
             patches.order.len(),
             "the patches the planes were made from"
         );
         self.find_moved(tolerance_m, points, &patches.order);
         let moved = self.moved.iter().map(|bits| bits.count_ones()).sum();
         let mut refitted = 0;
-        for slot in 0..self.now.len() {
+        for slot in 0..self.slots.len() {
             let blocks = patches.lists.of(slot);
             let moved_members: u32 = blocks
                 .iter()
@@ -152,13 +166,13 @@ impl RunningPlanes {
 
     fn find_moved(&mut self, tolerance_m: f32, points: &[Vec3], order: &[u32]) {
         self.moved.fill(0);
-        for (slot, &point) in order.iter().enumerate() {
-            let place = points[point as usize];
-            let d = place - self.now[slot];
+        for (slot, places) in self.slots.iter_mut().enumerate() {
+            let place = points[order[slot] as usize];
+            let d = place - place_of(places.now);
             if d.dot(d) > tolerance_m * tolerance_m {
                 self.moved[slot / LEAF_SLOTS] |= 1 << (slot % LEAF_SLOTS);
-                self.before[slot] = self.now[slot];
-                self.now[slot] = place;
+                places.before = places.now;
+                places.now = place.extend(0.0).to_array();
             }
         }
     }
@@ -172,11 +186,11 @@ impl RunningPlanes {
             let mut moved = *block;
             moved.members &= self.moved[block.leaf as usize];
             for slot in moved.slots() {
-                let old_d = (self.before[slot] - origin) * sums.per_m;
-                let new_d = (self.now[slot] - origin) * sums.per_m;
-                in_range &= new_d.abs().max_element() <= RANGE;
-                add(sums, old_d, -self.quanta);
-                add(sums, new_d, self.quanta);
+                let before = (place_of(self.slots[slot].before) - origin) * sums.per_m;
+                let now = (place_of(self.slots[slot].now) - origin) * sums.per_m;
+                in_range &= now.abs().max_element() <= RANGE;
+                add(sums, before, -self.quanta);
+                add(sums, now, self.quanta);
             }
         }
         in_range
@@ -184,7 +198,7 @@ impl RunningPlanes {
 
     /// Sums all members about where the patch's point is now, in the smallest unit that will do.
     fn sum_anew(&self, slot: usize, patches: &Patches, sums: &mut PatchSums) {
-        let origin = self.now[slot];
+        let origin = place_of(self.slots[slot].now);
         sums.origin = origin.to_array();
         sums.per_m = self.rest_per_m;
         for _ in 0..DOUBLINGS_MAX {
@@ -192,7 +206,7 @@ impl RunningPlanes {
             let mut in_range = true;
             for block in patches.lists.of(slot) {
                 for member in block.slots() {
-                    let d = (self.now[member] - origin) * sums.per_m;
+                    let d = (place_of(self.slots[member].now) - origin) * sums.per_m;
                     in_range &= d.abs().max_element() <= RANGE;
                     add(sums, d, self.quanta);
                 }
@@ -219,10 +233,14 @@ impl RunningPlanes {
             products: IVec3::from(sums.products).as_vec3() * share
                 - Vec3::new(mean.x * mean.y, mean.x * mean.z, mean.y * mean.z),
         };
-        let from_point = Vec3::from(sums.origin) - self.now[slot];
+        let from_point = Vec3::from(sums.origin) - place_of(self.slots[slot].now);
         let mean_m = from_point + mean / sums.per_m;
         self.planes[point] = plane_of_moments(mean_m, spread, normals[point]);
     }
+}
+
+fn place_of(place: [f32; 4]) -> Vec3 {
+    Vec3::new(place[0], place[1], place[2])
 }
 
 /// Adds the contribution of a member at `d`, in units, rounded to whole quanta; a negative number of

@@ -19,10 +19,8 @@ use image::{Rgba, RgbaImage};
 use rayon::prelude::*;
 
 /// What a surface is painted as.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tissue {
-    #[default]
     Liver,
     Heart,
 }

@@ -15,8 +15,6 @@ pub enum Binding<'a> {
     Texture(&'a wgpu::TextureView),
     /// `texture_2d<f32>` of a format that can't be filtered, read by `textureLoad`
     Unfiltered(&'a wgpu::TextureView),
-    /// `texture_2d<u32>`
-    Integers(&'a wgpu::TextureView),
     /// `texture_depth_2d`
     Depth(&'a wgpu::TextureView),
     /// `texture_storage_2d<…, write>` of the format given
@@ -45,7 +43,6 @@ impl<'a> Binding<'a> {
             Self::Write(_) => buffer(wgpu::BufferBindingType::Storage { read_only: false }),
             Self::Texture(_) => texture(wgpu::TextureSampleType::Float { filterable: true }),
             Self::Unfiltered(_) => texture(wgpu::TextureSampleType::Float { filterable: false }),
-            Self::Integers(_) => texture(wgpu::TextureSampleType::Uint),
             Self::Depth(_) => texture(wgpu::TextureSampleType::Depth),
             Self::Image(_, format) => wgpu::BindingType::StorageTexture {
                 access: wgpu::StorageTextureAccess::WriteOnly,
@@ -64,7 +61,6 @@ impl<'a> Binding<'a> {
             }
             Self::Texture(view)
             | Self::Unfiltered(view)
-            | Self::Integers(view)
             | Self::Depth(view)
             | Self::Image(view, _) => wgpu::BindingResource::TextureView(view),
             Self::Sampler(sampler) | Self::Comparison(sampler) => {

@@ -6,14 +6,12 @@ mod binding;
 mod buffer;
 mod error;
 mod shader;
-mod table;
 mod timer;
 
 pub use binding::{Binding, Kernel, bind, workgroups};
 pub use buffer::{read_buffer, read_texture_rgba8, read_texture_rgba16f, storage, uniform};
 pub use error::GpuError;
 pub use shader::{Wgsl, compile, join};
-pub use table::{Entry, Table};
 pub use timer::{PassTime, Timer};
 
 /// Joins WGSL files of the `shaders` folder: `wgsl!["common.wgsl", "tangents.wgsl"]`.

@@ -1,15 +1,13 @@
 //! The surface on the GPU: what every pass reads, and the one upload a frame.
 
 use crate::geom::SurfaceMesh;
-use crate::gpu::{Entry, Gpu, GpuError, Table, storage};
+use crate::gpu::{Gpu, GpuError, storage};
 use glam::Vec3;
 
 /// Buffers of a surface. Only the positions change.
 pub struct MeshBuffers {
     /// Where each point lies now [m], `[vec4f; points]`, `w` is 1.
     pub positions: wgpu::Buffer,
-    /// The same, as a table for kernels that look up many.
-    pub position_table: Table,
     /// The point of each vertex, `[u32; vertices]`.
     pub point_of: wgpu::Buffer,
     /// Texture coordinate of each vertex, `[vec2f; vertices]`.
@@ -31,10 +29,8 @@ impl MeshBuffers {
     ///
     /// [`GpuError::BufferTooLarge`] if the adapter can't bind one of the lists.
     pub fn new(gpu: &Gpu, mesh: &SurfaceMesh) -> Result<Self, GpuError> {
-        let places = places(&mesh.points);
         Ok(Self {
-            positions: storage(gpu, "positions", &places)?,
-            position_table: Table::new(gpu, "positions", Entry::Floats, &places)?,
+            positions: storage(gpu, "positions", &places(&mesh.points))?,
             point_of: storage(gpu, "point of each vertex", &mesh.point_of)?,
             uvs: storage(gpu, "texture coordinates", &mesh.uvs)?,
             indices: storage(gpu, "triangles", mesh.triangles.as_flattened())?,
@@ -55,18 +51,8 @@ impl MeshBuffers {
             self.point_count as usize,
             "one position a point"
         );
-        let places = places(points);
         gpu.queue
-            .write_buffer(&self.positions, 0, bytemuck::cast_slice(&places));
-        self.position_table.write(gpu, &places);
-    }
-}
-
-impl MeshBuffers {
-    /// Draws every triangle with the pipeline that `pass` has set.
-    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
-        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(0..self.index_count, 0, 0..1);
+            .write_buffer(&self.positions, 0, bytemuck::cast_slice(&places(points)));
     }
 }
 

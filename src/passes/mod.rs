@@ -1,24 +1,8 @@
 //! One GPU pass a file. A pass owns the buffers it writes and is immutable once made.
 
-pub mod draw;
-pub mod frame;
 pub mod light_path;
-pub mod lightmap;
-pub mod maps;
 pub mod mesh_buffers;
 pub mod plane_carried;
 pub mod plane_full;
 pub mod plane_incremental;
-pub mod shadow;
-pub mod surface;
 pub mod tangents;
-pub mod tonemap;
-pub mod tools;
-pub mod view;
-
-/// Linear radiance, with coverage in alpha.
-pub const RADIANCE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
-/// Depth, 0 near to 1 far.
-pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// What is shown: sRGB, encoded by the tone map.
-pub const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;

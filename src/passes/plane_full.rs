@@ -3,9 +3,7 @@
 use super::mesh_buffers::MeshBuffers;
 use super::tangents::Tangents;
 use crate::geom::patch::Patches;
-use crate::gpu::{
-    Binding, Entry, Gpu, GpuError, Kernel, Table, Timer, Wgsl, join, storage, uniform, workgroups,
-};
+use crate::gpu::{Binding, Gpu, GpuError, Kernel, Timer, Wgsl, join, storage, uniform, workgroups};
 use crate::wgsl;
 
 const WORKGROUP_SIZE: u32 = 64;
@@ -35,9 +33,9 @@ impl PlaneFull {
     /// What the pass is called in logs.
     pub const NAME: &'static str = "planes-full";
     /// The WGSL that sorts positions into slots.
-    pub const SORT_WGSL: &'static [Wgsl] = wgsl!["common.wgsl", "plane_sort.wgsl"];
+    pub const SORT_WGSL: &'static [Wgsl] = wgsl!["plane_sort.wgsl"];
     /// The WGSL that fits, joined in this order.
-    pub const FIT_WGSL: &'static [Wgsl] = wgsl!["common.wgsl", "plane_fit.wgsl", "plane_full.wgsl"];
+    pub const FIT_WGSL: &'static [Wgsl] = wgsl!["plane_fit.wgsl", "plane_full.wgsl"];
 
     /// Builds the pass over `patches`.
     ///
@@ -79,8 +77,7 @@ impl PlaneFull {
             },
         );
         let empty = vec![[0.0_f32; 4]; slot_count];
-        let slots = Table::new(gpu, "positions by slot", Entry::Floats, &empty)?;
-        let blocks = Table::new(gpu, "patch members", Entry::Integers, &patches.lists.blocks)?;
+        let slots = storage(gpu, "positions by slot", &empty)?;
         let planes = storage(gpu, "planes", &empty)?;
         let order = storage(gpu, "slot order", &patches.order)?;
         let sort_kernel = Kernel::new(
@@ -91,9 +88,9 @@ impl PlaneFull {
             "main",
             &[
                 Binding::Uniform(&params),
-                Binding::Unfiltered(&buffers.position_table.view),
+                Binding::Read(&buffers.positions),
                 Binding::Read(&order),
-                Binding::Image(&slots.view, Entry::Floats.format()),
+                Binding::Write(&slots),
             ],
         )?;
         let fit_kernel = Kernel::new(
@@ -104,10 +101,10 @@ impl PlaneFull {
             "main",
             &[
                 Binding::Uniform(&params),
-                Binding::Unfiltered(&slots.view),
+                Binding::Read(&slots),
                 Binding::Read(&order),
                 Binding::Read(&storage(gpu, "patches", &patches.lists.start)?),
-                Binding::Integers(&blocks.view),
+                Binding::Read(&storage(gpu, "patch members", &patches.lists.blocks)?),
                 Binding::Read(&tangents.normals),
                 Binding::Write(&planes),
             ],

@@ -1,5 +1,5 @@
-//! Planes fitted where something moved, from running moments: three dispatches, of which the second
-//! and third do nothing where nothing moved.
+//! Planes fitted where something moved, from running moments: two dispatches, the second of which
+//! does nothing for a patch in which nothing moved.
 
 use super::light_path::RefitCounts;
 use super::mesh_buffers::MeshBuffers;
@@ -7,15 +7,14 @@ use super::tangents::Tangents;
 use crate::geom::moments::RunningPlanes;
 use crate::geom::patch::{LEAF_SLOTS, Patches};
 use crate::gpu::{
-    Binding, Entry, Gpu, GpuError, Kernel, Table, Timer, Wgsl, join, read_buffer, storage, uniform,
-    workgroups,
+    Binding, Gpu, GpuError, Kernel, Timer, Wgsl, join, read_buffer, storage, uniform, workgroups,
 };
 use crate::wgsl;
 use glam::Vec3;
 
 const WORKGROUP_SIZE: u32 = 64;
 
-/// Mirror of `Params` in `shaders/plane_moved.wgsl` and `shaders/plane_commit.wgsl`.
+/// Mirror of `Params` in `shaders/plane_moved.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct MovedParams {
@@ -39,7 +38,6 @@ pub struct UpdateParams {
 pub struct PlaneIncremental {
     moved_kernel: Kernel,
     update_kernel: Kernel,
-    commit_kernel: Kernel,
     leaf_workgroups: u32,
     slot_workgroups: u32,
     /// Counts of the frame, then a mark for each slot.
@@ -54,12 +52,9 @@ impl PlaneIncremental {
     /// What the pass is called in logs.
     pub const NAME: &'static str = "planes-incremental";
     /// The WGSL that finds moved points.
-    pub const MOVED_WGSL: &'static [Wgsl] = wgsl!["common.wgsl", "plane_moved.wgsl"];
+    pub const MOVED_WGSL: &'static [Wgsl] = wgsl!["plane_moved.wgsl"];
     /// The WGSL that updates and fits, joined in this order.
-    pub const UPDATE_WGSL: &'static [Wgsl] =
-        wgsl!["common.wgsl", "plane_fit.wgsl", "plane_incremental.wgsl"];
-    /// The WGSL that takes over the moved places, joined in this order.
-    pub const COMMIT_WGSL: &'static [Wgsl] = wgsl!["common.wgsl", "plane_commit.wgsl"];
+    pub const UPDATE_WGSL: &'static [Wgsl] = wgsl!["plane_fit.wgsl", "plane_incremental.wgsl"];
 
     /// Builds the pass with the sums and planes of `points` at rest.
     ///
@@ -76,7 +71,7 @@ impl PlaneIncremental {
         tangents: &Tangents,
     ) -> Result<Self, GpuError> {
         let rest = RunningPlanes::new(points, normals, patches);
-        let sources = [Self::MOVED_WGSL, Self::UPDATE_WGSL, Self::COMMIT_WGSL].map(join);
+        let sources = [join(Self::MOVED_WGSL), join(Self::UPDATE_WGSL)];
         Self::with_sources(
             gpu,
             tolerance_m,
@@ -88,8 +83,8 @@ impl PlaneIncremental {
         )
     }
 
-    /// As [`PlaneIncremental::new`] from sums that are already made and with other WGSL for finding,
-    /// updating and committing: lets a test sabotage a kernel and see the check fail.
+    /// As [`PlaneIncremental::new`] from sums that are already made and with other WGSL for finding
+    /// and updating: lets a test sabotage a kernel and see the check fail.
     ///
     /// # Errors
     ///
@@ -101,36 +96,17 @@ impl PlaneIncremental {
         patches: &Patches,
         buffers: &MeshBuffers,
         tangents: &Tangents,
-        [moved_source, update_source, commit_source]: &[String; 3],
+        [moved_source, update_source]: &[String; 2],
     ) -> Result<Self, GpuError> {
         let slot_count = patches.order.len();
         let leaf_count = patches.leaf_count();
-        let places: Vec<[f32; 4]> = rest
-            .now
-            .iter()
-            .zip(&patches.order)
-            // Whole numbers are exact in f32 up to 2^24, more than a table has entries.
-            .map(|(p, &point)| [p.x, p.y, p.z, point as f32])
-            .collect();
-        let now = Table::new(gpu, "places by slot", Entry::Floats, &places)?;
-        let committed = Table::new(gpu, "committed places", Entry::Floats, &places)?;
-        let blocks = Table::new(gpu, "patch members", Entry::Integers, &patches.lists.blocks)?;
+        let slots = storage(gpu, "places by slot", &rest.slots)?;
         let moved = storage(gpu, "moved slots", &rest.moved)?;
         let frame = storage(gpu, "marked patches", &vec![0_u32; 2 + leaf_count])?;
         let sums = storage(gpu, "patch sums", &rest.patches)?;
         let planes: Vec<[f32; 4]> = rest.planes.iter().map(|plane| plane.to_array()).collect();
         let planes = storage(gpu, "planes", &planes)?;
         let of_leaves = patches.patches_of_leaves();
-        let moved_params = uniform(
-            gpu,
-            Self::NAME,
-            &MovedParams {
-                slot_count: slot_count as u32,
-                tolerance_squared_m2: tolerance_m * tolerance_m,
-                pad0: 0,
-                pad1: 0,
-            },
-        );
         let moved_kernel = Kernel::new(
             gpu,
             Self::NAME,
@@ -138,12 +114,21 @@ impl PlaneIncremental {
             moved_source,
             "main",
             &[
-                Binding::Uniform(&moved_params),
-                Binding::Unfiltered(&buffers.position_table.view),
-                Binding::Unfiltered(&committed.view),
+                Binding::Uniform(&uniform(
+                    gpu,
+                    Self::NAME,
+                    &MovedParams {
+                        slot_count: slot_count as u32,
+                        tolerance_squared_m2: tolerance_m * tolerance_m,
+                        pad0: 0,
+                        pad1: 0,
+                    },
+                )),
+                Binding::Read(&buffers.positions),
+                Binding::Read(&storage(gpu, "slot order", &patches.order)?),
                 Binding::Read(&storage(gpu, "patches of leaves", &of_leaves.start)?),
                 Binding::Read(&storage(gpu, "patches of leaves", &of_leaves.blocks)?),
-                Binding::Image(&now.view, Entry::Floats.format()),
+                Binding::Write(&slots),
                 Binding::Write(&moved),
                 Binding::Write(&frame),
             ],
@@ -165,33 +150,18 @@ impl PlaneIncremental {
                         pad0: 0,
                     },
                 )),
-                Binding::Unfiltered(&committed.view),
-                Binding::Unfiltered(&now.view),
+                Binding::Read(&slots),
                 Binding::Read(&moved),
-                Binding::Integers(&blocks.view),
+                Binding::Read(&storage(gpu, "patch members", &patches.lists.blocks)?),
                 Binding::Read(&tangents.normals),
                 Binding::Write(&sums),
                 Binding::Write(&frame),
                 Binding::Write(&planes),
             ],
         )?;
-        let commit_kernel = Kernel::new(
-            gpu,
-            Self::NAME,
-            Self::COMMIT_WGSL,
-            commit_source,
-            "main",
-            &[
-                Binding::Uniform(&moved_params),
-                Binding::Read(&moved),
-                Binding::Unfiltered(&now.view),
-                Binding::Image(&committed.view, Entry::Floats.format()),
-            ],
-        )?;
         Ok(Self {
             moved_kernel,
             update_kernel,
-            commit_kernel,
             leaf_workgroups: workgroups(
                 gpu,
                 Self::NAME,
@@ -205,7 +175,7 @@ impl PlaneIncremental {
         })
     }
 
-    /// Adds the dispatches to `encoder`.
+    /// Adds both dispatches to `encoder`.
     pub fn record(&self, encoder: &mut wgpu::CommandEncoder, timer: &mut Timer) {
         encoder.clear_buffer(&self.frame, 0, None);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
@@ -214,7 +184,6 @@ impl PlaneIncremental {
         });
         self.moved_kernel.dispatch(&mut pass, self.leaf_workgroups);
         self.update_kernel.dispatch(&mut pass, self.slot_workgroups);
-        self.commit_kernel.dispatch(&mut pass, self.leaf_workgroups);
     }
 
     /// What the last submitted frame found and fitted, waited for.

@@ -6,9 +6,7 @@
 use super::mesh_buffers::MeshBuffers;
 use crate::geom::SurfaceMesh;
 use crate::geom::tangent::{Fans, gradient_max_per_m, rest_normals};
-use crate::gpu::{
-    Binding, Entry, Gpu, GpuError, Kernel, Table, Timer, Wgsl, join, storage, uniform, workgroups,
-};
+use crate::gpu::{Binding, Gpu, GpuError, Kernel, Timer, Wgsl, join, storage, uniform, workgroups};
 use crate::wgsl;
 use glam::Vec3;
 
@@ -87,11 +85,6 @@ impl Tangents {
         let tangents = storage(gpu, "tangents", &vertices)?;
         let uv_gradients = storage(gpu, "UV gradients", &[vertices.clone(), vertices].concat())?;
 
-        let corners = |label, list: &[[u32; 2]]| Table::new(gpu, label, Entry::Integers, list);
-        let point_corners = corners("point fans", &fans.point_corners)?;
-        let vertex_corners = corners("vertex fans", &fans.vertex_corners)?;
-        let uv_inverse = Table::new(gpu, "inverse UV edges", Entry::Floats, &fans.uv_inverse)?;
-
         let normals_kernel = Kernel::new(
             gpu,
             Self::NAME,
@@ -109,9 +102,9 @@ impl Tangents {
                         pad2: 0,
                     },
                 )),
-                Binding::Unfiltered(&buffers.position_table.view),
+                Binding::Read(&buffers.positions),
                 Binding::Read(&storage(gpu, "point fans", &fans.point_start)?),
-                Binding::Integers(&point_corners.view),
+                Binding::Read(&storage(gpu, "point fan corners", &fans.point_corners)?),
                 Binding::Read(&rest_buffer),
                 Binding::Write(&normals),
             ],
@@ -133,12 +126,12 @@ impl Tangents {
                         pad1: 0,
                     },
                 )),
-                Binding::Unfiltered(&buffers.position_table.view),
+                Binding::Read(&buffers.positions),
                 Binding::Read(&normals),
                 Binding::Read(&buffers.point_of),
                 Binding::Read(&storage(gpu, "vertex fans", &fans.vertex_start)?),
-                Binding::Integers(&vertex_corners.view),
-                Binding::Unfiltered(&uv_inverse.view),
+                Binding::Read(&storage(gpu, "vertex fan corners", &fans.vertex_corners)?),
+                Binding::Read(&storage(gpu, "inverse UV edges", &fans.uv_inverse)?),
                 Binding::Write(&tangents),
                 Binding::Write(&uv_gradients),
             ],

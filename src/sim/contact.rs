@@ -32,7 +32,7 @@ pub struct Hit {
 /// The distance to an axis is a convex function of the way, so Newton's method from the start never
 /// oversteps the first contact.
 pub fn sweep(shape: ToolShape, start: Vec3, end: Vec3) -> Option<Hit> {
-    let (axis, radius) = (shape.axis_m(), shape.radius_m());
+    let (axis, radius) = (shape.axis(), shape.radius_m());
     let way = end - start;
     let nearest = |share: f32| {
         let at = start + share * way;
@@ -189,7 +189,7 @@ impl Touch {
 
 /// How deep `point` is inside the tool at `position` [m]; negative outside.
 pub fn depth_m(shape: ToolShape, position_m: Vec3, point: Vec3) -> f32 {
-    let axis = shape.axis_m();
+    let axis = shape.axis();
     let offset = point - position_m;
     let along = offset.dot(axis) / axis.length_squared().max(f32::MIN_POSITIVE);
     shape.radius_m() - (offset - along.clamp(0.0, 1.0) * axis).length()
@@ -227,7 +227,7 @@ mod tests {
             end in prop::array::uniform3(-0.1_f32..0.1),
             axis in prop::array::uniform3(-0.05_f32..0.05),
         ) {
-            let shape = ToolShape::Capsule { radius_m: 0.01, axis_m: Vec3::from(axis) };
+            let shape = ToolShape::Capsule { radius_m: 0.01, axis: Vec3::from(axis) };
             let (start, end) = (Vec3::from(start), Vec3::from(end));
             let deepest = (0..=10_000)
                 .map(|k| depth_m(shape, Vec3::ZERO, start.lerp(end, k as f32 / 1e4)))

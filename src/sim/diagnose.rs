@@ -42,7 +42,7 @@ impl Energy {
 
 /// Energy of the body as it is.
 pub fn energy(simulation: &Simulation) -> Energy {
-    let gravity = simulation.setup().gravity_m_s2.as_dvec3();
+    let gravity = simulation.body_params().gravity_m_s2.as_dvec3();
     let mut kinetic_j = 0.0;
     let mut gravitational_j = 0.0;
     for (i, &mass) in simulation.setup().masses_kg.iter().enumerate() {

@@ -3,11 +3,6 @@
 //! The operators are plain loops over arrays, which the compiler turns into vector instructions;
 //! no instruction is contracted or reordered, so the bits do not depend on the instruction set.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one counter for several arrays of the same fixed length"
-)]
-
 use glam::Vec4;
 use rayon::prelude::*;
 use std::ops::{Add, Mul, Neg, Sub};

@@ -37,20 +37,6 @@ pub enum Method {
     XpbdNeoHookean,
 }
 
-impl Method {
-    /// Every method, the recommended one last.
-    pub const ALL: [Self; 3] = [Self::MassSpring, Self::XpbdSprings, Self::XpbdNeoHookean];
-
-    /// The name scene files use.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::MassSpring => "mass-spring",
-            Self::XpbdSprings => "xpbd-springs",
-            Self::XpbdNeoHookean => "xpbd-neo-hookean",
-        }
-    }
-}
-
 /// Method, material and time step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -118,6 +104,38 @@ impl SolverParams {
     }
 }
 
+/// What acts on the whole body.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BodyParams {
+    /// Acceleration of every particle [m/s²].
+    pub gravity_m_s2: Vec3,
+    /// Velocities are multiplied by exp(−damping · time step) once a step [1/s].
+    pub damping_per_s: f32,
+}
+
+impl Default for BodyParams {
+    fn default() -> Self {
+        Self {
+            gravity_m_s2: Vec3::new(0.0, -9.81, 0.0),
+            damping_per_s: 2.0,
+        }
+    }
+}
+
+impl BodyParams {
+    /// What is wrong with these values, with the allowed range; `None` if they can be used.
+    pub fn problem(&self) -> Option<String> {
+        let [x, y, z] = self.gravity_m_s2.to_array();
+        out_of_range(&[
+            ("gravity_m_s2", x, -1e4, 1e4),
+            ("gravity_m_s2", y, -1e4, 1e4),
+            ("gravity_m_s2", z, -1e4, 1e4),
+            ("damping_per_s", self.damping_per_s, 0.0, 1e4),
+        ])
+    }
+}
+
 /// The first value that is outside its range, in words.
 fn out_of_range(checks: &[(&str, f32, f32, f32)]) -> Option<String> {
     checks
@@ -138,30 +156,17 @@ pub struct BodySetup {
     pub masses_kg: Vec<f32>,
     /// Particles that are held in place; one flag each.
     pub fixed: Vec<bool>,
-    /// Share of each tetrahedron that is tissue, scaling its stiffness: `Lattice::fill`, or nothing
-    /// at all for a mesh that is all tissue.
+    /// Share of each tetrahedron that is tissue, scaling its stiffness: `Lattice::fill`, or 1 for a
+    /// mesh that is all tissue.
     pub fill: Vec<f32>,
+    /// Surface points at rest [m].
+    pub rest_points: Vec<Vec3>,
     /// Triangles of the surface; corners are points.
-    pub triangles: Vec<[u32; 3]>,
-    /// Where each surface point hangs in the tetrahedra.
+    pub point_triangles: Vec<[u32; 3]>,
+    /// Where each surface point hangs.
     pub embedding: Embedding,
-    /// Acceleration of every particle [m/s²].
-    pub gravity_m_s2: Vec3,
-    /// Velocities are multiplied by exp(−damping · time step) once a step [1/s].
-    pub damping_per_s: f32,
-}
-
-impl BodySetup {
-    /// What is wrong with gravity or damping, with the allowed range; `None` if both can be used.
-    pub fn problem(&self) -> Option<String> {
-        let [x, y, z] = self.gravity_m_s2.to_array();
-        out_of_range(&[
-            ("gravity_m_s2", x, -1e4, 1e4),
-            ("gravity_m_s2", y, -1e4, 1e4),
-            ("gravity_m_s2", z, -1e4, 1e4),
-            ("damping_per_s", self.damping_per_s, 0.0, 1e4),
-        ])
-    }
+    /// What acts on the whole body from the start.
+    pub params: BodyParams,
 }
 
 /// Shape of a rigid tool.
@@ -170,8 +175,8 @@ impl BodySetup {
 pub enum ToolShape {
     /// About the tool's position.
     Sphere { radius_m: f32 },
-    /// Round the segment from the tool's position (the tip) to position + axis.
-    Capsule { radius_m: f32, axis_m: Vec3 },
+    /// Round the segment from the tool's position (the tip) to position + `axis` [m].
+    Capsule { radius_m: f32, axis: Vec3 },
 }
 
 impl ToolShape {
@@ -183,10 +188,10 @@ impl ToolShape {
     }
 
     /// From the tool's position to the other end of its axis [m]; zero for a sphere.
-    pub fn axis_m(self) -> Vec3 {
+    pub fn axis(self) -> Vec3 {
         match self {
             Self::Sphere { .. } => Vec3::ZERO,
-            Self::Capsule { axis_m, .. } => axis_m,
+            Self::Capsule { axis, .. } => axis,
         }
     }
 }

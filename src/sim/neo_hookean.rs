@@ -4,11 +4,6 @@
 //! so their 2×2 system (J W Jᵀ + α̃) Δλ = −(C + α̃ λ) is solved as one: solved one after the other
 //! they would undo each other's work.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one counter for several arrays of the same fixed length"
-)]
-
 use super::{
     Lame,
     constraint::SHAPE_SQUARED_MIN,

@@ -1,7 +1,7 @@
 //! The body's state and one step of it.
 
 use super::{
-    BodySetup, SolverParams, StepReport, ToolInput,
+    BodyParams, BodySetup, SolverParams, StepReport, ToolInput,
     diagnose::{rest_volume_m3, volume_and_inverted},
     grab::Tissue,
     model::Model,
@@ -25,6 +25,7 @@ const POINTS_PER_TASK: usize = 4096;
 pub struct Simulation {
     setup: BodySetup,
     solver: SolverParams,
+    body: BodyParams,
     /// Tetrahedra with a positive volume at rest; the others have no model.
     sound: Vec<u32>,
     sound_tets: Vec<[u32; 4]>,
@@ -52,14 +53,11 @@ impl Simulation {
     /// # Panics
     ///
     /// If the lists of `setup` do not fit each other, a mass is not positive, or a parameter is out
-    /// of range (see [`SolverParams::problem`] and [`BodySetup::problem`]).
-    pub fn new(mut setup: BodySetup, params: SolverParams) -> Self {
-        if setup.fill.is_empty() {
-            setup.fill = vec![1.0; setup.tets.tets.len()];
-        }
+    /// of range (see [`SolverParams::problem`] and [`BodyParams::problem`]).
+    pub fn new(setup: BodySetup, params: SolverParams) -> Self {
         check(&setup);
         assert_usable(params.problem());
-        assert_usable(setup.problem());
+        assert_usable(setup.params.problem());
         let mesh = &setup.tets;
         let sound: Vec<u32> = (0..mesh.tets.len() as u32)
             .filter(|&tet| is_sound(&setup, tet as usize))
@@ -79,7 +77,7 @@ impl Simulation {
             particles: Particles::new(&mesh.particles, &inverse_masses(&setup)),
             tools: Tools::default(),
             positions: mesh.particles.clone(),
-            points: vec![Vec3::ZERO; setup.embedding.particles.len()],
+            points: setup.rest_points.clone(),
             point_bounds: (Vec3::ZERO, Vec3::ZERO),
             report: StepReport::default(),
             calm_steps: 0,
@@ -92,6 +90,7 @@ impl Simulation {
             sound,
             sound_tets,
             solver: params,
+            body: setup.params,
             setup,
         };
         simulation.publish();
@@ -142,16 +141,15 @@ impl Simulation {
         self.wake();
     }
 
-    /// Changes gravity and damping from the next step on; wakes the body.
+    /// Changes gravity or damping from the next step on; wakes the body.
     ///
     /// # Panics
     ///
-    /// If a value is out of range (see [`BodySetup::problem`]).
-    pub fn set_gravity_and_damping(&mut self, gravity_m_s2: Vec3, damping_per_s: f32) {
-        if (gravity_m_s2, damping_per_s) != (self.setup.gravity_m_s2, self.setup.damping_per_s) {
-            self.setup.gravity_m_s2 = gravity_m_s2;
-            self.setup.damping_per_s = damping_per_s;
-            assert_usable(self.setup.problem());
+    /// If a value is out of range (see [`BodyParams::problem`]).
+    pub fn set_body_params(&mut self, params: BodyParams) {
+        assert_usable(params.problem());
+        if params != self.body {
+            self.body = params;
             self.wake();
         }
     }
@@ -208,7 +206,7 @@ impl Simulation {
         &self.points
     }
 
-    /// The body as it was made, with gravity and damping as they are now.
+    /// The body as it was made.
     pub fn setup(&self) -> &BodySetup {
         &self.setup
     }
@@ -218,9 +216,9 @@ impl Simulation {
         self.solver
     }
 
-    /// Number of tetrahedra.
-    pub fn tet_count(&self) -> usize {
-        self.setup.tets.tets.len()
+    /// Gravity and damping.
+    pub fn body_params(&self) -> BodyParams {
+        self.body
     }
 
     /// What the last step did.
@@ -277,7 +275,7 @@ impl Simulation {
         for substep in 0..self.solver.substeps {
             self.substep(substep);
         }
-        let damping = (-self.setup.damping_per_s * self.solver.timestep_s).exp();
+        let damping = (-self.body.damping_per_s * self.solver.timestep_s).exp();
         for velocity in &mut self.particles.velocities {
             *velocity *= damping;
         }
@@ -313,7 +311,7 @@ impl Simulation {
         let (from, to) = (share(substep), share(substep + 1));
         let accelerations = (self.model).accelerations(&self.particles.places, &self.solver);
         self.particles
-            .predict(self.setup.gravity_m_s2, accelerations, substep_s);
+            .predict(self.body.gravity_m_s2, accelerations, substep_s);
         self.model.begin_substep();
         self.tools.begin_substep();
         for _ in 0..self.solver.iterations {
@@ -365,9 +363,10 @@ fn check(setup: &BodySetup) {
         setup.fill.len() == setup.tets.tets.len() && setup.fill.iter().all(|&fill| fill > 0.0),
         "one share of tissue a tetrahedron, none 0"
     );
+    let points = setup.rest_points.len();
     assert!(
-        setup.embedding.particles.len() == setup.embedding.weights.len(),
-        "four weights a surface point"
+        setup.embedding.particles.len() == points && setup.embedding.weights.len() == points,
+        "one place in the tetrahedra a surface point"
     );
     assert!(
         (setup.tets.tets.iter().chain(&setup.embedding.particles))

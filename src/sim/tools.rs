@@ -177,7 +177,7 @@ impl Tool {
 
     /// Lists the points within the box that the tool sweeps, with room for their own way.
     fn find_contacts(&mut self, body: Met) {
-        let axis = self.input.shape.axis_m();
+        let axis = self.input.shape.axis();
         let radius = self.input.shape.radius_m();
         let ends = [self.from_m, self.input.position_m];
         let room = Vec3::splat(1.5 * radius + body.way_m);
@@ -203,7 +203,7 @@ fn sane(input: ToolInput, body: Met) -> ToolInput {
     let near = |x: Vec3| x.is_finite() && x.abs().max_element() < reach;
     let radius_m = input.shape.radius_m();
     let usable = near(input.position_m - centre)
-        && near(input.shape.axis_m())
+        && near(input.shape.axis())
         && radius_m > 0.0
         && radius_m < reach
         && input.friction >= 0.0

@@ -139,18 +139,6 @@ impl Document<'_> {
         if !fits {
             return Err(ImportFault::malformed(place, rule));
         }
-        let components = match content {
-            Content::Positions => 3,
-            Content::TextureCoordinates => 2,
-            Content::Indices => 1,
-        };
-        // They may be absent, but what is there says that the writer meant another type.
-        for limit in accessor.min.iter().chain(&accessor.max) {
-            if limit.as_array().map(Vec::len) != Some(components) {
-                let problem = format!("min and max must have {components} number(s) each");
-                return Err(ImportFault::malformed(place, problem));
-            }
-        }
         Ok(component)
     }
 
@@ -169,7 +157,11 @@ impl Document<'_> {
                 let run = self.run(view, offset, count, size, &place)?;
                 (0..run.count).map(|k| &run.element(k)[..size]).collect()
             }
-            None if accessor.sparse.is_none() => return Err(self.no_bytes(place)),
+            None if accessor.sparse.is_none() => {
+                return Err(bad(
+                    "it has neither a bufferView nor sparse values".to_owned()
+                ));
+            }
             None => {
                 // Zeros cost the file nothing, so its size has to be the bound.
                 let held: usize = self.buffers.iter().map(Vec::len).sum();
@@ -203,18 +195,6 @@ impl Document<'_> {
             }
         }
         Ok(elements)
-    }
-
-    /// Why an accessor has no bytes: a compression that the file could be read without, or a fault.
-    fn no_bytes(&self, place: String) -> ImportFault {
-        let extensions = &self.root.extensions_used;
-        match extensions.iter().find(|name| name.contains("compression")) {
-            Some(name) => ImportFault::Unsupported {
-                feature: format!("the glTF extension {name}"),
-                remedy: "export the file without compression",
-            },
-            None => ImportFault::malformed(place, "it has neither a bufferView nor sparse values"),
-        }
     }
 
     /// `count` elements of `size` bytes from `offset` in a view.

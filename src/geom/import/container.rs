@@ -22,16 +22,9 @@ pub(super) enum Resource {
     File(PathBuf),
 }
 
-/// Splits the file `path`: a GLB by its magic, whatever it is called; all else is JSON.
-pub(super) fn split<'a>(bytes: &'a [u8], path: &Path) -> Result<Chunks<'a>, ImportFault> {
+/// Splits `bytes` by their magic, whatever the file is called.
+pub(super) fn split(bytes: &[u8]) -> Result<Chunks<'_>, ImportFault> {
     if !bytes.starts_with(b"glTF") {
-        if path
-            .extension()
-            .is_some_and(|ending| ending.eq_ignore_ascii_case("glb"))
-        {
-            let problem = "a GLB starts with the four letters glTF, this file does not";
-            return Err(ImportFault::malformed("GLB header", problem));
-        }
         return Ok(Chunks {
             json: bytes,
             binary: None,

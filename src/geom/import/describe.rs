@@ -1,12 +1,13 @@
 //! What a mesh or picture file holds, in words: the text of `palpate check`.
 
-use super::error::ImportError;
-use super::part::{TextureSource, read_parts};
-use super::picture::read_picture;
+use super::error::{ImportError, ImportFault};
+use super::part::{TextureSource, read_bytes, read_parts};
 use super::surface::{ImportOptions, read_surface};
 use std::fmt::Write;
 use std::path::Path;
 
+/// Pictures with a longer side are refused [pixels].
+const SIDE_MAX: u32 = 16_384;
 /// Extents outside this are hardly an organ in metres.
 const PLAUSIBLE_EXTENT_M: std::ops::RangeInclusive<f32> = 0.005..=1.0;
 
@@ -19,8 +20,8 @@ pub fn describe(path: &Path) -> Result<String, ImportError> {
     let ending = path.extension().and_then(|ending| ending.to_str());
     match ending.map(str::to_ascii_lowercase).as_deref() {
         Some("png" | "jpg" | "jpeg") => {
-            let picture = read_picture(&TextureSource::File(path.to_owned()))?;
-            Ok(format!("picture: {}", about(&picture)))
+            let picture = read_bytes(path).and_then(|bytes| describe_picture(&bytes, "picture"));
+            picture.map_err(|fault| fault.of(path))
         }
         _ => describe_surface(path),
     }
@@ -80,27 +81,34 @@ fn describe_surface(path: &Path) -> Result<String, ImportError> {
         writeln!(text, "note: {note}").expect(TO_STRING);
     }
     if let Some(source) = &surface.base_color {
-        let place = match source {
-            TextureSource::File(file) => file.display().to_string(),
-            TextureSource::Embedded(_) => "embedded".to_owned(),
+        let (bytes, name) = match source {
+            TextureSource::File(file) => (read_bytes(file), file.display().to_string()),
+            TextureSource::Embedded(bytes) => (Ok(bytes.clone()), "embedded".to_owned()),
         };
-        let picture = read_picture(source).map_err(|error| match source {
-            TextureSource::File(_) => error,
-            TextureSource::Embedded(_) => error.fault.of(path),
-        })?;
-        writeln!(text, "base colour: {place}, {}", about(&picture)).expect(TO_STRING);
+        let picture = bytes.and_then(|bytes| describe_picture(&bytes, &name));
+        let picture = picture.map_err(|fault| fault.of(path))?;
+        writeln!(text, "base colour: {picture}").expect(TO_STRING);
     }
     Ok(text.trim_end().to_owned())
 }
 
-/// Size and channels of a picture.
-fn about(picture: &image::DynamicImage) -> String {
+/// Size and channels of a PNG or JPEG, which is decoded to be sure that it can be.
+fn describe_picture(bytes: &[u8], place: &str) -> Result<String, ImportFault> {
+    let bad = |problem: String| ImportFault::malformed(place, problem);
+    let format = image::guess_format(bytes)
+        .map_err(|_| bad("neither PNG nor JPEG by its first bytes".to_owned()))?;
+    let mut reader = image::ImageReader::with_format(std::io::Cursor::new(bytes), format);
+    let mut limits = image::Limits::default();
+    limits.max_image_width = Some(SIDE_MAX);
+    limits.max_image_height = Some(SIDE_MAX);
+    reader.limits(limits);
+    let picture = reader.decode().map_err(|error| bad(error.to_string()))?;
     let color = picture.color();
-    let channels = color.channel_count();
-    format!(
-        "{} x {} pixels, {channels} channels of {} bits",
+    Ok(format!(
+        "{place}: {format:?}, {} x {} pixels, {} channels of {} bits",
         picture.width(),
         picture.height(),
-        color.bits_per_pixel() / u16::from(channels)
-    )
+        color.channel_count(),
+        color.bits_per_pixel() / u16::from(color.channel_count())
+    ))
 }

@@ -15,15 +15,9 @@ use std::path::Path;
 /// Required extensions that change the look but not the shape.
 const HARMLESS_EXTENSIONS: [&str; 2] = ["KHR_materials_", "KHR_lights_punctual"];
 
-/// JSON beyond this is refused unread, and so is JSON with more objects: an object of two bytes
-/// takes hundreds in memory. Buffers in data URIs count as bytes only.
-const JSON_BYTES_MAX: usize = 1 << 26;
-const JSON_OBJECTS_MAX: usize = 1 << 20;
-
 /// Reads the meshes of the glTF file `path` whose content is `bytes`.
 pub(super) fn read(bytes: &[u8], path: &Path) -> Result<FileParts, ImportFault> {
-    let chunks = container::split(bytes, path)?;
-    check_json_size(chunks.json)?;
+    let chunks = container::split(bytes)?;
     let root = Root::from_slice(chunks.json)
         .map_err(|error| ImportFault::malformed("JSON", error.to_string()))?;
     check_version(&root)?;
@@ -45,20 +39,6 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<FileParts, ImportFault> 
         reader.place(mesh, world_from_mesh)?;
     }
     Ok(reader.file)
-}
-
-fn check_json_size(json: &[u8]) -> Result<(), ImportFault> {
-    let objects = json.iter().filter(|&&byte| byte == b'{').count();
-    if json.len() <= JSON_BYTES_MAX && objects <= JSON_OBJECTS_MAX {
-        return Ok(());
-    }
-    Err(ImportFault::TooLarge {
-        what: format!(
-            "{} bytes of JSON with {objects} objects are over the limit of {JSON_BYTES_MAX} and \
-             {JSON_OBJECTS_MAX}",
-            json.len()
-        ),
-    })
 }
 
 fn check_version(root: &Root) -> Result<(), ImportFault> {
@@ -441,20 +421,5 @@ fn triangulate(corners: &[u32], mode: Mode) -> Option<Vec<[u32; 3]>> {
             Some(rim.windows(2).map(|w| [hub, w[0], w[1]]).collect())
         }
         Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => None,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn strips_and_fans_keep_the_side_they_face() {
-        let strip = triangulate(&[0, 1, 2, 3, 4], Mode::TriangleStrip);
-        assert_eq!(strip, Some(vec![[0, 1, 2], [1, 3, 2], [2, 3, 4]]));
-        let fan = triangulate(&[7, 1, 2, 3], Mode::TriangleFan);
-        assert_eq!(fan, Some(vec![[7, 1, 2], [7, 2, 3]]));
-        assert_eq!(triangulate(&[0, 1, 2], Mode::LineStrip), None);
-        assert_eq!(triangulate(&[0, 1], Mode::Triangles), Some(Vec::new()));
     }
 }

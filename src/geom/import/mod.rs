@@ -13,7 +13,6 @@ mod error;
 mod gltf;
 mod obj;
 mod part;
-mod picture;
 mod repair;
 mod surface;
 mod topology;
@@ -23,7 +22,6 @@ mod weld;
 pub use describe::describe;
 pub use error::{ImportError, ImportFault};
 pub use part::{FileParts, Part, TextureSource, read_parts};
-pub use picture::read_picture;
 pub use surface::{ImportOptions, ImportedSurface, read_surface, read_surface_bytes};
 pub use uv::{UvState, uv_state};
 

@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3};
 use std::path::{Path, PathBuf};
 
 /// Files beyond this are refused unread [bytes].
-const FILE_BYTES_MAX: u64 = 1 << 28;
+const FILE_BYTES_MAX: u64 = 1 << 30;
 /// Vertices and triangles beyond this are refused: a node may repeat a mesh, so the size of the
 /// file is no bound by itself.
 const ELEMENTS_MAX: usize = 1 << 24;

@@ -10,8 +10,6 @@ const ROUNDS_MAX: usize = 4;
 /// A repair may remove this share of the triangles, or [`REMOVED_MIN`] in a small mesh.
 const REMOVED_SHARE: usize = 100;
 const REMOVED_MIN: usize = 8;
-/// Layers that are peeled off a fin before it is taken for more than a defect.
-const PEELS_MAX: usize = 16;
 /// Holes with a longer rim are openings, not defects.
 const HOLE_EDGES_MAX: usize = 64;
 /// As [`HOLE_EDGES_MAX`], as a share of the diagonal of the surface.
@@ -48,10 +46,10 @@ pub(super) fn repair(union: &mut Union) -> Result<Repair, Defects> {
 }
 
 /// Removes triangles at edges with more than two: first the fins, which end in a border, and only
-/// if there are none all of them. Returns how many went; crowded edges may be left.
+/// if there are none all of them. Returns how many went.
 fn cut_crowded(union: &mut Union) -> usize {
     let before = union.faces.len();
-    for _ in 0..PEELS_MAX {
+    loop {
         let triangles = union.point_triangles();
         let uses = edge_uses(&triangles);
         let mut on_border = vec![false; triangles.len()];
@@ -63,7 +61,7 @@ fn cut_crowded(union: &mut Union) -> usize {
             }
         }
         if !on_crowd.contains(&true) {
-            break;
+            return before - union.faces.len();
         }
         let fins = (0..triangles.len()).any(|k| on_border[k] && on_crowd[k]);
         let mut k = 0..triangles.len();
@@ -72,7 +70,6 @@ fn cut_crowded(union: &mut Union) -> usize {
             !(on_crowd[k] && (on_border[k] || !fins))
         });
     }
-    before - union.faces.len()
 }
 
 /// Closes every hole within the limits by a fan about its middle; returns how many there were.

@@ -267,7 +267,7 @@ fn uv_overlap_share_is_the_overlapped_area() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig::with_cases(64))]
 
     /// Any soup either fails or becomes a closed outward surface.
     #[test]

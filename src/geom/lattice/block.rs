@@ -2,9 +2,9 @@
 
 use super::{
     super::{Embedding, SurfaceMesh, TetMesh},
-    Lattice, LatticeError, TETS_MAX, boundary_triangles,
+    boundary_triangles,
     inside::Grid,
-    masses_kg, tets_of_cubes,
+    tet_volume_m3, tets_of_cubes,
 };
 use glam::{DVec3, Vec2, Vec3};
 use std::collections::HashMap;
@@ -12,51 +12,37 @@ use std::collections::HashMap;
 /// Space between two charts, as a share of the atlas.
 const GUTTER: f32 = 0.02;
 
-/// A box from the origin to `size_m` of tissue of `density_kg_m3`, with its own skin as surface, in
-/// cells of about `cell_m`: as many a side as fit best.
-///
-/// # Errors
-///
-/// [`LatticeError`] for a cell that gives too many tetrahedra or is longer than the box, and for a
-/// box or a density that is not positive.
-pub fn block(
-    size_m: Vec3,
-    cell_m: f32,
-    density_kg_m3: f32,
-) -> Result<(SurfaceMesh, Lattice), LatticeError> {
-    if !(size_m.is_finite() && size_m.min_element() > 0.0) {
-        return Err(LatticeError::NoVolume);
-    }
-    if !(density_kg_m3.is_finite() && density_kg_m3 > 0.0) {
-        return Err(LatticeError::DensityOutOfRange { density_kg_m3 });
-    }
-    let longest = size_m.max_element();
-    let counts = (size_m / cell_m).round().max(Vec3::ONE);
-    let tets = 5.0 * counts.as_dvec3().element_product();
-    if !(cell_m > 0.0 && cell_m <= 1.0001 * longest && tets <= TETS_MAX as f64) {
-        return Err(LatticeError::CellOutOfRange {
-            cell_m,
-            // A quarter more than fits on average: counts are rounded.
-            min_m: 1.25 * (5.0 * size_m.element_product() / TETS_MAX as f32).cbrt(),
-            max_m: longest,
-        });
-    }
-    let (surface, mut lattice) = block_of_cells(size_m, counts.to_array().map(|n| n as usize));
-    for mass in &mut lattice.masses_kg {
-        *mass *= density_kg_m3;
-    }
-    Ok((surface, lattice))
+/// A box of tetrahedra with its own skin as surface.
+#[derive(Clone, Debug)]
+pub struct Block {
+    /// Five tetrahedra a cell, all positive.
+    pub tets: TetMesh,
+    /// The skin, in six charts that do not overlap and share one scale.
+    pub surface: SurfaceMesh,
+    /// Each surface point is a particle.
+    pub embedding: Embedding,
 }
 
-/// A box from the origin to `size_m` in `cells` cells a side, of density 1 kg/m³.
-///
-/// The surface has six charts that do not overlap and share one scale; each of its points is a
-/// particle.
+impl Block {
+    /// Mass of each particle [kg]: a quarter of each of its tetrahedra.
+    pub fn masses_kg(&self, density_kg_m3: f32) -> Vec<f32> {
+        let mut masses = vec![0.0_f64; self.tets.particles.len()];
+        for &tet in &self.tets.tets {
+            let quarter = tet_volume_m3(&self.tets, tet) * f64::from(density_kg_m3) / 4.0;
+            for particle in tet {
+                masses[particle as usize] += quarter;
+            }
+        }
+        masses.into_iter().map(|mass| mass as f32).collect()
+    }
+}
+
+/// A box from the origin to `size_m` in `cells` cells a side.
 ///
 /// # Panics
 ///
 /// If a side is not a positive number, or a count is 0.
-pub fn block_of_cells(size_m: Vec3, cells: [usize; 3]) -> (SurfaceMesh, Lattice) {
+pub fn block(size_m: Vec3, cells: [usize; 3]) -> Block {
     assert!(
         size_m.is_finite() && size_m.min_element() > 0.0,
         "a box has three positive sides, not {size_m}"
@@ -65,23 +51,20 @@ pub fn block_of_cells(size_m: Vec3, cells: [usize; 3]) -> (SurfaceMesh, Lattice)
     let grid = Grid::of_size(cells);
     let all: Vec<usize> = (0..grid.cubes()).collect();
     let (mut tets, _) = tets_of_cubes(&grid, &all);
-    let cell = size_m.as_dvec3() / DVec3::from_array(cells.map(|n| n as f64));
+    let scale = size_m.as_dvec3() / DVec3::from_array(cells.map(|n| n as f64));
     for particle in &mut tets.particles {
-        *particle = (particle.as_dvec3() * cell).as_vec3();
+        *particle = (particle.as_dvec3() * scale).as_vec3();
     }
     let (surface, carriers) = skin(&tets, size_m);
-    let fill = vec![1.0; tets.tets.len()];
-    let lattice = Lattice {
-        masses_kg: masses_kg(&tets, &fill, size_m.as_dvec3().element_product()),
-        fill,
-        embedding: Embedding {
-            particles: carriers.iter().map(|&carrier| [carrier; 4]).collect(),
-            weights: vec![[1.0, 0.0, 0.0, 0.0]; carriers.len()],
-        },
-        cell_m: cell.max_element() as f32,
-        tets,
+    let embedding = Embedding {
+        particles: carriers.iter().map(|&carrier| [carrier; 4]).collect(),
+        weights: vec![[1.0, 0.0, 0.0, 0.0]; carriers.len()],
     };
-    (surface, lattice)
+    Block {
+        tets,
+        surface,
+        embedding,
+    }
 }
 
 /// The surface of a box, and the particle of each of its points.
