@@ -355,7 +355,8 @@ mod tests {
         assert_eq!(covered_twice(&mesh, 512), 0);
         let middle = mesh.uvs.iter().sum::<Vec2>() / mesh.uvs.len() as f32;
         for corner in mesh.triangles[0] {
-            mesh.uvs[corner as usize] += (middle - mesh.uvs[corner as usize]) * 0.9;
+            let uv = &mut mesh.uvs[corner as usize];
+            *uv = uv.lerp(middle, 0.9);
         }
         assert!(covered_twice(&mesh, 512) > 0);
         assert!(report(&mesh, 512).overlap_share > 0.0);

@@ -8,7 +8,7 @@ mod heart;
 mod liver;
 
 use super::canvas::Canvas;
-use super::vessel::{Habit, Samples, Tree};
+use super::vessel::{Samples, Tree};
 use super::{Dab, Site, Tissue};
 use crate::geom::noise::{cellular, fractal, gradient, lerp, smoothstep};
 use glam::Vec3;
