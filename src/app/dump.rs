@@ -2,7 +2,7 @@
 
 use super::renderer::Renderer;
 use super::{AppError, Session};
-use crate::measure::files::{make_folder, write, write_npy};
+use crate::measure::files::{create_folder, write, write_npy};
 use crate::passes::frame::patch_radius_m;
 use crate::passes::view::{View, placed_lights};
 use serde_json::json;
@@ -14,7 +14,7 @@ use std::path::Path;
 ///
 /// [`AppError`] if something can't be read back or written.
 pub fn write_dump(folder: &Path, session: &Session, renderer: &Renderer) -> Result<(), AppError> {
-    make_folder(folder)?;
+    create_folder(folder)?;
     let mesh = &session.mesh;
     let drawn = renderer.geometry()?;
     let vertices = mesh.point_of.len() as u64;

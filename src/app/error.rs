@@ -3,7 +3,7 @@
 use crate::geom::import::ImportError;
 use crate::geom::lattice::LatticeError;
 use crate::gpu::GpuError;
-use crate::measure::files::MeasureError;
+use crate::measure::FileError;
 use crate::scene::SceneError;
 use std::fmt;
 
@@ -30,7 +30,7 @@ pub enum AppError {
     /// The GPU or a pass.
     Gpu(GpuError),
     /// A file that can't be written, or a recording that can't be read.
-    File(MeasureError),
+    File(FileError),
     /// The window or its event loop.
     Window(String),
     /// Some of the files that `check` read are wrong; it has said which.
@@ -77,4 +77,4 @@ macro_rules! from {
     };
 }
 
-from!(SceneError => Scene, ImportError => Import, LatticeError => Lattice, GpuError => Gpu, MeasureError => File);
+from!(SceneError => Scene, ImportError => Import, LatticeError => Lattice, GpuError => Gpu, FileError => File);

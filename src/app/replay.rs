@@ -5,7 +5,7 @@ use super::record::{Recording, encode_png};
 use super::{AppError, Outcome, Session, dump, load, thread_count};
 use crate::gpu::Gpu;
 use crate::measure::against::compare_runs;
-use crate::measure::files::{make_folder, write};
+use crate::measure::files::{create_folder, write};
 use crate::measure::pictures::PictureTolerance;
 use crate::measure::states::Nearness;
 use crate::scene::Scene;
@@ -132,7 +132,7 @@ impl Run {
         } else {
             None
         };
-        make_folder(&options.out)?;
+        create_folder(&options.out)?;
         Ok(Self {
             recording: Recording::new(options.scene.clone(), threads),
             session,

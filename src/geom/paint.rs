@@ -19,8 +19,10 @@ use image::{Rgba, RgbaImage};
 use rayon::prelude::*;
 
 /// What a surface is painted as.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Tissue {
+    #[default]
     Liver,
     Heart,
 }
