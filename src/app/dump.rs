@@ -71,7 +71,11 @@ pub fn write_dump(folder: &Path, session: &Session, renderer: &Renderer) -> Resu
         &[height, width, 3],
         &renderer.radiance()?,
     )?;
-    write_npy(&folder.join("depth.npy"), &[height, width], &renderer.depth()?)?;
+    write_npy(
+        &folder.join("depth.npy"),
+        &[height, width],
+        &renderer.depth()?,
+    )?;
     let text = serde_json::to_string_pretty(&description(session, renderer))
         .expect("a description has string keys");
     Ok(write(&folder.join("dump.json"), text.as_bytes())?)
@@ -91,7 +95,11 @@ fn description(session: &Session, renderer: &Renderer) -> serde_json::Value {
         .iter()
         .map(|light| {
             let place = if light.is_point { "at_m" } else { "toward" };
-            let power = if light.is_point { "intensity_w_sr" } else { "irradiance_w_m2" };
+            let power = if light.is_point {
+                "intensity_w_sr"
+            } else {
+                "irradiance_w_m2"
+            };
             json!({
                 place: light.place.to_array(),
                 power: light.power.to_array(),

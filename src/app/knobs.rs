@@ -16,14 +16,8 @@ pub fn surface(ui: &mut Ui, surface: &mut SurfaceSection) -> Option<PanelAsk> {
     ui.add(Slider::new(&mut surface.roughness, 0.05..=0.8).text("roughness"));
     ui.add(Slider::new(&mut surface.wetness, 0.0..=2.0).text("wetness"));
     ui.add(Slider::new(&mut surface.exposure, 0.1..=4.0).text("exposure"));
-    let rebuilt = |s: &SurfaceSection| {
-        (
-            s.samples,
-            s.quadrature,
-            s.blur_passes,
-            s.light_map_size_px,
-        )
-    };
+    let rebuilt =
+        |s: &SurfaceSection| (s.samples, s.quadrature, s.blur_passes, s.light_map_size_px);
     if rebuilt(surface) != rebuilt(&before) {
         Some(PanelAsk::Rebuild)
     } else if *surface != before {

@@ -170,7 +170,10 @@ fn picture(path: &Path) -> Result<RgbaImage, AppError> {
     let reader = image::ImageReader::new(std::io::Cursor::new(&bytes))
         .with_guessed_format()
         .map_err(|e| wrong(e.to_string()))?;
-    Ok(reader.decode().map_err(|e| wrong(e.to_string()))?.to_rgba8())
+    Ok(reader
+        .decode()
+        .map_err(|e| wrong(e.to_string()))?
+        .to_rgba8())
 }
 
 /// The surface of `file`, scaled, welded, closed, with a usable UV map.

@@ -10,8 +10,8 @@ mod knobs;
 mod load;
 mod orbit;
 mod panel;
-mod renderer;
 mod record;
+mod renderer;
 mod replay;
 mod script;
 mod session;
@@ -30,12 +30,7 @@ const VERSION_NUMBER: &str = env!("CARGO_PKG_VERSION");
 /// Commit that was built.
 const VERSION_COMMIT: &str = env!("PALPATE_COMMIT");
 /// Version and commit.
-pub const VERSION: &str = concat!(
-    env!("CARGO_PKG_VERSION"),
-    " (",
-    env!("PALPATE_COMMIT"),
-    ")"
-);
+pub const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), " (", env!("PALPATE_COMMIT"), ")");
 
 /// How a command ended when nothing went wrong with it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

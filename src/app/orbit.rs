@@ -73,7 +73,8 @@ impl Orbit {
     /// The ray through a place of the picture: (0, 0) is its top left corner, (1, 1) its bottom right.
     pub fn ray(&self, at: Vec2, aspect: f32) -> Ray {
         let eye = self.eye();
-        let world_from_view = glam::camera::rh::view::look_at_mat4(eye, self.target, Vec3::Y).inverse();
+        let world_from_view =
+            glam::camera::rh::view::look_at_mat4(eye, self.target, Vec3::Y).inverse();
         let half_height = (0.5 * self.fov_y).tan();
         let in_view = Vec3::new(
             (2.0 * at.x - 1.0) * half_height * aspect,

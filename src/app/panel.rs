@@ -302,10 +302,7 @@ fn light_path_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAs
         .selected_text(method.name())
         .show_ui(ui, |ui| {
             for other in LightPathMethod::ALL {
-                if ui
-                    .selectable_value(method, other, other.name())
-                    .changed()
-                {
+                if ui.selectable_value(method, other, other.name()).changed() {
                     asks.push(PanelAsk::Rebuild);
                 }
             }

@@ -119,7 +119,13 @@ impl Recording {
         span("simulation", "simulation", 0.0, tick.sim_ms, 1);
         // The GPU has a clock of its own; its passes follow the simulation.
         for pass in &drawn.passes {
-            span(pass.name, "gpu", tick.sim_ms + pass.start_ms, pass.gpu_ms, 2);
+            span(
+                pass.name,
+                "gpu",
+                tick.sim_ms + pass.start_ms,
+                pass.gpu_ms,
+                2,
+            );
         }
     }
 

@@ -3,8 +3,7 @@
 use super::orbit::Orbit;
 use super::{AppError, Session, load};
 use crate::gpu::{
-    Gpu, PassTime, Timer, read_buffer, read_texture_depth, read_texture_rgba8,
-    read_texture_rgba16f,
+    Gpu, PassTime, Timer, read_buffer, read_texture_depth, read_texture_rgba8, read_texture_rgba16f,
 };
 use crate::passes::frame::FramePasses;
 use crate::passes::light_path::RefitCounts;

@@ -1,7 +1,7 @@
 //! The replay: a scene's script without a window, and the files it leaves.
 
-use super::renderer::{Frame, Renderer};
 use super::record::{Recording, encode_png};
+use super::renderer::{Frame, Renderer};
 use super::{AppError, Outcome, Session, dump, load, thread_count};
 use crate::gpu::Gpu;
 use crate::measure::against::compare_runs;

@@ -162,7 +162,8 @@ mod tests {
     fn an_approach_that_misses_is_turned_to_the_nearest_point() {
         let points = [Vec3::ZERO, Vec3::X, Vec3::Y];
         let from = Vec3::new(5.0, 5.0, 5.0);
-        let (touch, direction) = approach_ray(from, Vec3::new(4.0, 0.0, 5.0), &points, &[[0, 1, 2]]);
+        let (touch, direction) =
+            approach_ray(from, Vec3::new(4.0, 0.0, 5.0), &points, &[[0, 1, 2]]);
         assert_eq!(touch, Vec3::X);
         assert!((direction - (Vec3::X - from).normalize()).length() < 1e-6);
     }

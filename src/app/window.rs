@@ -1,12 +1,12 @@
 //! The window: winit events in, frames out. Everything that is computed lives in the session.
 
 use super::hand::{Hand, HandKnobs};
+use super::history::{History, Sample};
 use super::load;
 use super::orbit::{Orbit, Ray};
-use super::history::{History, Sample};
 use super::panel::{self, PanelAsk, PanelState};
-use super::renderer::Renderer;
 use super::record::{Recording, encode_png};
+use super::renderer::Renderer;
 use super::replay::{ReplayOptions, replay};
 use super::{AppError, Outcome, Session, thread_count};
 use crate::gpu::{Gpu, GpuError};

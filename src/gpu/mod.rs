@@ -10,7 +10,9 @@ mod table;
 mod timer;
 
 pub use binding::{Binding, Kernel, bind, workgroups};
-pub use buffer::{read_buffer, read_texture_depth, read_texture_rgba8, read_texture_rgba16f, storage, uniform};
+pub use buffer::{
+    read_buffer, read_texture_depth, read_texture_rgba8, read_texture_rgba16f, storage, uniform,
+};
 pub use error::GpuError;
 pub use shader::{Wgsl, compile, join};
 pub use table::{Entry, Table};

@@ -55,40 +55,40 @@ impl Draw {
             ..Default::default()
         };
         let targets = kind.fragment.map(|(_, format)| [Some(format.into())]);
-        let pipeline = gpu
-            .device
-            .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some(kind.pass),
-                layout: Some(&pipeline_layout),
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some(kind.vertex),
-                    compilation_options: options.clone(),
-                    buffers: &[],
-                },
-                primitive: wgpu::PrimitiveState {
-                    cull_mode: kind.cull,
-                    ..Default::default()
-                },
-                depth_stencil: kind.depth.map(|format| wgpu::DepthStencilState {
-                    format,
-                    depth_write_enabled: Some(true),
-                    depth_compare: Some(wgpu::CompareFunction::Less),
-                    stencil: wgpu::StencilState::default(),
-                    bias: wgpu::DepthBiasState::default(),
-                }),
-                multisample: wgpu::MultisampleState::default(),
-                fragment: kind.fragment.zip(targets.as_ref()).map(
-                    |((entry_point, _), targets)| wgpu::FragmentState {
+        let pipeline =
+            gpu.device
+                .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                    label: Some(kind.pass),
+                    layout: Some(&pipeline_layout),
+                    vertex: wgpu::VertexState {
                         module: &module,
-                        entry_point: Some(entry_point),
+                        entry_point: Some(kind.vertex),
                         compilation_options: options.clone(),
-                        targets,
+                        buffers: &[],
                     },
-                ),
-                multiview_mask: None,
-                cache: None,
-            });
+                    primitive: wgpu::PrimitiveState {
+                        cull_mode: kind.cull,
+                        ..Default::default()
+                    },
+                    depth_stencil: kind.depth.map(|format| wgpu::DepthStencilState {
+                        format,
+                        depth_write_enabled: Some(true),
+                        depth_compare: Some(wgpu::CompareFunction::Less),
+                        stencil: wgpu::StencilState::default(),
+                        bias: wgpu::DepthBiasState::default(),
+                    }),
+                    multisample: wgpu::MultisampleState::default(),
+                    fragment: kind.fragment.zip(targets.as_ref()).map(
+                        |((entry_point, _), targets)| wgpu::FragmentState {
+                            module: &module,
+                            entry_point: Some(entry_point),
+                            compilation_options: options.clone(),
+                            targets,
+                        },
+                    ),
+                    multiview_mask: None,
+                    cache: None,
+                });
         match pollster::block_on(scope.pop()) {
             None => Ok(Self {
                 pipeline,

@@ -45,7 +45,11 @@ impl FramePlan {
         let blurs = scene.surface.blur_passes;
         let all = [
             (Tangents::NAME, 2, true),
-            (PlaneCarried::NAME, 1, method == Some(LightPathMethod::Carried)),
+            (
+                PlaneCarried::NAME,
+                1,
+                method == Some(LightPathMethod::Carried),
+            ),
             (PlaneFull::NAME, 2, method == Some(LightPathMethod::Full)),
             (
                 PlaneIncremental::NAME,
@@ -164,7 +168,14 @@ impl FramePasses {
         let frame = uniform(
             gpu,
             "frame",
-            &FrameUniform::new(&view, 1.0, &lights, &scene.surface, Mat4::IDENTITY, uv_per_m),
+            &FrameUniform::new(
+                &view,
+                1.0,
+                &lights,
+                &scene.surface,
+                Mat4::IDENTITY,
+                uv_per_m,
+            ),
         );
         let maps = Maps::new(gpu, tissue);
         let nothing = NoShadow::new(gpu);
@@ -346,7 +357,9 @@ mod tests {
             names(&marched),
             ["tangents", "planes-full", "subsurface", "tonemap"]
         );
-        let gooey = plan(&format!("{method}[surface]\nkind = \"gooey\"\nblur_passes = 3"));
+        let gooey = plan(&format!(
+            "{method}[surface]\nkind = \"gooey\"\nblur_passes = 3"
+        ));
         assert_eq!(
             names(&gooey),
             ["tangents", "lightmap", "blur", "gooey", "tonemap"]

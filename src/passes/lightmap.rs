@@ -177,9 +177,19 @@ mod tests {
     #[test]
     fn a_square_of_two_metres_on_half_the_map_has_a_quarter_a_metre() {
         let mesh = SurfaceMesh {
-            points: vec![Vec3::ZERO, 2.0 * Vec3::X, 2.0 * Vec3::new(1.0, 1.0, 0.0), 2.0 * Vec3::Y],
+            points: vec![
+                Vec3::ZERO,
+                2.0 * Vec3::X,
+                2.0 * Vec3::new(1.0, 1.0, 0.0),
+                2.0 * Vec3::Y,
+            ],
             point_of: vec![0, 1, 2, 3],
-            uvs: vec![Vec2::ZERO, Vec2::new(0.5, 0.0), Vec2::splat(0.5), Vec2::new(0.0, 0.5)],
+            uvs: vec![
+                Vec2::ZERO,
+                Vec2::new(0.5, 0.0),
+                Vec2::splat(0.5),
+                Vec2::new(0.0, 0.5),
+            ],
             triangles: vec![[0, 1, 2], [0, 2, 3]],
         };
         assert!((uv_per_m(&mesh) - 0.25).abs() < 1e-6);

@@ -101,7 +101,10 @@ impl Surface {
             constants.extend([
                 ("HAS_PLANES", flag(inputs.has_planes)),
                 ("SAMPLES", f64::from(section.samples)),
-                ("PUBLISHED", flag(section.quadrature == Quadrature::Published)),
+                (
+                    "PUBLISHED",
+                    flag(section.quadrature == Quadrature::Published),
+                ),
             ]);
         }
         let draw = Draw::new(

@@ -238,7 +238,11 @@ fn unit_capsule() -> (Vec<[f32; 4]>, Vec<u32>) {
 #[cfg(test)]
 fn capsule_point(tool: &DrawnTool, n: [f32; 4]) -> Vec3 {
     let along = tool.axis_m.try_normalize().unwrap_or(Vec3::Z);
-    let side = if along.x.abs() > 0.9 { Vec3::Y } else { Vec3::X };
+    let side = if along.x.abs() > 0.9 {
+        Vec3::Y
+    } else {
+        Vec3::X
+    };
     let across = side.cross(along).normalize();
     let normal = n[0] * across + n[1] * along.cross(across) + n[2] * along;
     tool.tip_m + n[3] * tool.axis_m + tool.radius_m * normal
@@ -279,6 +283,9 @@ mod tests {
         let (r, l) = (TOOL.radius_m, TOOL.axis_m.length());
         let exact = std::f32::consts::PI * r * r * (l + 4.0 / 3.0 * r);
         // A ring of 32 steps encloses 0.6 % less than a circle.
-        assert!((volume / exact - 1.0).abs() < 0.02, "{volume} m³, not {exact}");
+        assert!(
+            (volume / exact - 1.0).abs() < 0.02,
+            "{volume} m³, not {exact}"
+        );
     }
 }

@@ -29,7 +29,12 @@ impl View {
     /// View to clip space, depth 0 near to 1 far; near and far are shares of the distance.
     pub fn clip_from_view(&self, aspect: f32) -> Mat4 {
         let distance = self.eye.distance(self.target).max(1e-4);
-        glam::camera::rh::proj::directx::perspective(self.fov_y, aspect, 0.02 * distance, 20.0 * distance)
+        glam::camera::rh::proj::directx::perspective(
+            self.fov_y,
+            aspect,
+            0.02 * distance,
+            20.0 * distance,
+        )
     }
 
     /// World to clip space.
@@ -138,9 +143,8 @@ impl FrameUniform {
             },
         };
         let extinction = surface.layers.map(|layer| {
-            let [r, g, b] = std::array::from_fn(|c| {
-                layer.absorption_per_m[c] + layer.scattering_per_m[c]
-            });
+            let [r, g, b] =
+                std::array::from_fn(|c| layer.absorption_per_m[c] + layer.scattering_per_m[c]);
             [r, g, b, 0.0]
         });
         let scattering = surface.layers.map(|layer| {

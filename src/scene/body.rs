@@ -142,7 +142,9 @@ impl Region {
         let in_ball = |center: Vec3, radius: f32| x.distance(center) <= radius;
         let behind = |point: Vec3, normal: Vec3| (x - point).dot(normal) <= 0.0;
         self.box_m.is_some_and(in_box)
-            || self.box_share.is_some_and(|corners| in_box(corners.map(share)))
+            || self
+                .box_share
+                .is_some_and(|corners| in_box(corners.map(share)))
             || self.sphere_m.is_some_and(|b| in_ball(b.center, b.radius))
             || self
                 .sphere_share

@@ -40,8 +40,9 @@ impl Checker {
     pub fn exactly_one(&mut self, key: &str, given: &[bool], names: &str) {
         let count = given.iter().filter(|&&is_given| is_given).count();
         if count != 1 {
-            self.problems
-                .push(format!("{key} needs exactly one of {names}; it has {count}"));
+            self.problems.push(format!(
+                "{key} needs exactly one of {names}; it has {count}"
+            ));
         }
     }
 

@@ -102,14 +102,20 @@ impl LightSection {
             0.0,
             1e6,
         );
-        for place in [self.toward, self.at_m, self.at_share].into_iter().flatten() {
+        for place in [self.toward, self.at_m, self.at_share]
+            .into_iter()
+            .flatten()
+        {
             c.range3(&key, place, -1e6, 1e6);
         }
         if self.toward.is_some_and(|d| d.length() < 1e-6) {
             c.problem(&format!("{key}.toward"), "it must not be zero");
         }
         if self.shadow && self.toward.is_none() {
-            c.problem(&format!("{key}.shadow"), "only a far light (toward) casts shadows");
+            c.problem(
+                &format!("{key}.shadow"),
+                "only a far light (toward) casts shadows",
+            );
         }
     }
 }

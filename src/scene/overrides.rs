@@ -71,7 +71,10 @@ fn insert(table: &mut Table, path: &str, value: Value) -> Result<(), String> {
                     .and_then(|s| s.parse::<usize>().ok())
                     .filter(|&i| i < count)
                     .ok_or_else(|| {
-                        format!("{step} is a list of {count}: write {step}.0 to {step}.{}", count.max(1) - 1)
+                        format!(
+                            "{step} is a list of {count}: write {step}.0 to {step}.{}",
+                            count.max(1) - 1
+                        )
                     })?;
                 match &mut items[index] {
                     Value::Table(inner) => inner,

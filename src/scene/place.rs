@@ -46,7 +46,10 @@ mod tests {
         };
         let middle = rest.place(None, Some(Vec3::splat(0.5)));
         assert_eq!(middle, Some(Vec3::new(0.0, 2.0, 2.5)));
-        assert_eq!(rest.place(Some(Vec3::ONE), Some(Vec3::ZERO)), Some(Vec3::ONE));
+        assert_eq!(
+            rest.place(Some(Vec3::ONE), Some(Vec3::ZERO)),
+            Some(Vec3::ONE)
+        );
         assert_eq!(rest.length(None, Some(0.5)), Some(2.0));
         assert_eq!(rest.place(None, None), None);
     }

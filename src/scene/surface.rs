@@ -141,16 +141,24 @@ impl SurfaceSection {
 
     pub(super) fn check(&self, c: &mut Checker) {
         c.range("surface.samples", self.samples as f32, 1.0, 256.0);
-        c.range("surface.layer_depth_max_m", self.layer_depth_max_m, 1e-6, 1.0);
+        c.range(
+            "surface.layer_depth_max_m",
+            self.layer_depth_max_m,
+            1e-6,
+            1.0,
+        );
         for (index, layer) in self.layers.iter().enumerate() {
             let key = |name: &str| format!("surface.layer.{index}.{name}");
             c.range3(&key("absorption_per_m"), layer.absorption_per_m, 0.0, 1e6);
             c.range3(&key("scattering_per_m"), layer.scattering_per_m, 0.0, 1e6);
             c.range(&key("asymmetry"), layer.asymmetry, -0.98, 0.98);
-            let clear = (0..3)
-                .any(|i| layer.absorption_per_m[i] + layer.scattering_per_m[i] < 1e-3);
+            let clear =
+                (0..3).any(|i| layer.absorption_per_m[i] + layer.scattering_per_m[i] < 1e-3);
             if clear {
-                c.problem(&key("scattering_per_m"), "absorption + scattering must be at least 0.001");
+                c.problem(
+                    &key("scattering_per_m"),
+                    "absorption + scattering must be at least 0.001",
+                );
             }
         }
         for (name, value, high) in [

@@ -110,7 +110,10 @@ impl ToolSection {
                 c.exactly_one(&format!("tool.{index}"), &axes, "axis_m, axis_share");
             }
             ToolShapeName::Sphere if axes != [false, false] => {
-                c.problem(&key("shape"), "a sphere has no axis; say shape = \"capsule\"");
+                c.problem(
+                    &key("shape"),
+                    "a sphere has no axis; say shape = \"capsule\"",
+                );
             }
             ToolShapeName::Sphere => {}
         }
@@ -122,15 +125,31 @@ impl ToolSection {
             c.problem(&key("keys"), "a tool needs at least one key");
         }
         if let Some(approach) = self.approach {
-            c.range3(&key("approach.from_share"), approach.from_share, -100.0, 100.0);
-            c.range3(&key("approach.toward_share"), approach.toward_share, -100.0, 100.0);
+            c.range3(
+                &key("approach.from_share"),
+                approach.from_share,
+                -100.0,
+                100.0,
+            );
+            c.range3(
+                &key("approach.toward_share"),
+                approach.toward_share,
+                -100.0,
+                100.0,
+            );
             if approach.from_share == approach.toward_share {
-                c.problem(&key("approach"), "from_share and toward_share are the same place");
+                c.problem(
+                    &key("approach"),
+                    "from_share and toward_share are the same place",
+                );
             }
         }
         for (k, pair) in self.keys.windows(2).enumerate() {
             if pair[1].at_s <= pair[0].at_s {
-                c.problem(&key(&format!("keys.{}.at_s", k + 1)), "keys must follow in time");
+                c.problem(
+                    &key(&format!("keys.{}.at_s", k + 1)),
+                    "keys must follow in time",
+                );
             }
         }
         for (k, frame) in self.keys.iter().enumerate() {
