@@ -17,6 +17,7 @@
 // Fails:   surfaces that fold below the patch radius; light that enters far from P.
 
 override PUBLISHED: u32 = 0u;
+override LIGHTS: u32 = 2u;
 
 struct Ray {
     position: vec3f,
@@ -34,41 +35,46 @@ fn bottoms_at(ray: Ray, offset: vec3f) -> vec4f {
     return frame.layer_depth_max_m * textureSampleLevel(layer_map, linear_sampler, uv, 0.0);
 }
 
-// Optical depth from the light to M; beyond any eye's reach where the plane faces away.
-fn depth_to_light(
-    ray: Ray,
-    offset: vec3f,
-    blend: f32,
-    to_light: vec3f,
-    bottoms: vec4f,
-    sigma_t: array<vec3f, 4>,
-) -> vec3f {
-    let n = normalize(mix(ray.normal, ray.plane.xyz, blend));
-    let cosine = dot(n, to_light);
-    let below = blend * ray.plane.w - dot(n, offset);
-    if cosine <= 1e-3 {
-        return vec3f(60.0);
-    }
-    return optical_depth(max(below, 0.0) / cosine, cosine, bottoms, sigma_t);
+// Optical depth from a light to a point that lies `below` the plane [m]; beyond any eye's reach where the
+// plane faces away.
+fn depth_to_light(below: f32, cosine: f32, bottoms: vec4f, sigma_t: mat4x3f) -> vec3f {
+    let c = max(cosine, 1e-3);
+    let depth = optical_depth(max(below, 0.0) / c, c, bottoms, sigma_t);
+    return select(depth, vec3f(60.0), cosine <= 1e-3);
 }
 
-fn single_scattering(ray: Ray, light_index: u32, count: u32, bottoms_p: vec4f) -> vec3f {
-    let lit = light_at(frame.lights[light_index], ray.position);
-    // All of the light's planes face away: nothing to gather.
-    if max(dot(ray.normal, lit.to_light), dot(ray.plane.xyz, lit.to_light)) <= 1e-3 {
-        return vec3f(0.0);
-    }
-    var sigma_t = array<vec3f, 4>(
+// Radiance [W/(m2 sr)] scattered once towards the eye; `shares` is how much of each light arrives.
+fn single_scattering(ray: Ray, shares: vec4f, bottoms_p: vec4f) -> vec3f {
+    let sigma_t = mat4x3f(
         frame.extinction[0].xyz,
         frame.extinction[1].xyz,
         frame.extinction[2].xyz,
         frame.extinction[3].xyz,
     );
-    let cos_scatter = dot(lit.to_light, ray.to_eye);
-    var source = array<vec3f, 4>();
-    for (var j = 0u; j < 4u; j += 1u) {
-        let scattering = frame.scattering[j];
-        source[j] = scattering.xyz * phase(cos_scatter, scattering.w);
+    let sigma_s = mat4x3f(
+        frame.scattering[0].xyz,
+        frame.scattering[1].xyz,
+        frame.scattering[2].xyz,
+        frame.scattering[3].xyz,
+    );
+    var to_light: array<vec3f, 4>;
+    var arriving: array<vec3f, 4>;
+    var phases: array<vec4f, 4>;
+    var before: array<vec3f, 4>;
+    var before_e: array<vec3f, 4>;
+    for (var k = 0u; k < LIGHTS; k += 1u) {
+        let lit = light_at(frame.lights[k], ray.position);
+        let cosine = dot(lit.to_light, ray.to_eye);
+        to_light[k] = lit.to_light;
+        arriving[k] = shares[k] * lit.irradiance;
+        phases[k] = vec4f(
+            phase(cosine, frame.scattering[0].w),
+            phase(cosine, frame.scattering[1].w),
+            phase(cosine, frame.scattering[2].w),
+            phase(cosine, frame.scattering[3].w),
+        );
+        before[k] = depth_to_light(0.0, dot(ray.normal, lit.to_light), bottoms_p, sigma_t);
+        before_e[k] = exp(-before[k]);
     }
     let clearest = min(min(sigma_t[1].x, sigma_t[1].y), sigma_t[1].z);
     let reach = min(frame.layer_depth_max_m / ray.n_v, 8.0 / clearest);
@@ -76,44 +82,36 @@ fn single_scattering(ray: Ray, light_index: u32, count: u32, bottoms_p: vec4f) -
     var to_eye_depth = vec3f(0.0);
     var bottoms = bottoms_p;
     var t = 0.0;
-    var a0 = depth_to_light(ray, vec3f(0.0), 0.0, lit.to_light, bottoms, sigma_t);
-    for (var i = 1u; i <= count; i += 1u) {
-        let share = f32(i) / f32(count);
+    for (var i = 1u; i <= SAMPLES; i += 1u) {
+        let share = f32(i) / f32(SAMPLES);
         let next = reach * select(share * share, share, PUBLISHED != 0u);
         let step = next - t;
         let offset = -next * ray.to_eye;
+        let blend = next / reach;
         let bottoms_next = bottoms_at(ray, offset);
-        let light_depth = depth_to_light(ray, offset, next / reach, lit.to_light, bottoms_next, sigma_t);
+        let n = normalize(mix(ray.normal, ray.plane.xyz, blend));
+        let below = blend * ray.plane.w - dot(n, offset);
+        var content = filled(t * ray.n_v, next * ray.n_v, 0.5 * (bottoms + bottoms_next));
         if PUBLISHED != 0u {
-            // The sample at the start of the step stands for all of it.
+            // The layer at the start of the step stands for all of it.
             let layer = layer_at(t * ray.n_v, bottoms);
-            sum += step * source[layer] * exp(-to_eye_depth - a0);
-            to_eye_depth += step * sigma_t[layer];
-            a0 = light_depth;
-        } else {
-            // The layers between the two ends, by how much of the step each fills at its middle.
-            let top = t * ray.n_v;
-            let bottom = next * ray.n_v;
-            let edges = clamp(0.5 * (bottoms + bottoms_next), vec4f(top), vec4f(bottom));
-            let filled = vec4f(
-                edges.x - top,
-                max(edges.y - edges.x, 0.0),
-                max(edges.z - max(edges.x, edges.y), 0.0),
-                bottom - max(max(edges.x, edges.y), edges.z),
-            ) / (bottom - top);
-            let extinction = filled.x * sigma_t[0] + filled.y * sigma_t[1]
-                + filled.z * sigma_t[2] + filled.w * sigma_t[3];
-            let emitted = filled.x * source[0] + filled.y * source[1]
-                + filled.z * source[2] + filled.w * source[3];
-            let eye_next = to_eye_depth + step * extinction;
-            sum += step * emitted * piece(to_eye_depth + a0, eye_next + light_depth);
-            to_eye_depth = eye_next;
-            a0 = light_depth;
+            content = vec4f(vec4u(layer) == vec4u(0u, 1u, 2u, 3u));
         }
+        let eye_next = to_eye_depth + step * (sigma_t * content);
+        for (var k = 0u; k < LIGHTS; k += 1u) {
+            let a = eye_next + depth_to_light(below, dot(n, to_light[k]), bottoms_next, sigma_t);
+            let e = exp(-a);
+            let emitted = sigma_s * (content * phases[k]);
+            let mean = select(piece(before[k], a, before_e[k], e), before_e[k], PUBLISHED != 0u);
+            sum += step * arriving[k] * emitted * mean;
+            before[k] = a;
+            before_e[k] = e;
+        }
+        to_eye_depth = eye_next;
         t = next;
         bottoms = bottoms_next;
     }
-    return sum * lit.irradiance;
+    return sum;
 }
 
 @fragment
@@ -136,22 +134,22 @@ fn fragment(in: Varyings) -> @location(0) vec4f {
     let deep = textureSample(inner_map, linear_sampler, deep_uv).rgb;
     let shadow = unshadowed(in.world, at.normal);
 
-    var single = vec3f(0.0);
+    var shares = vec4f(1.0);
     var diffuse = vec3f(0.05, 0.055, 0.06);
-    for (var k = 0u; k < frame.light_count; k += 1u) {
+    for (var k = 0u; k < LIGHTS; k += 1u) {
         let lit = light_at(frame.lights[k], in.world);
-        let share = select(1.0, shadow, frame.lights[k].power.w > 0.0);
-        single += share * single_scattering(ray, k, SAMPLES, bottoms);
+        shares[k] = select(1.0, shadow, frame.lights[k].power.w > 0.0);
         // Red light wanders farthest, so it reaches farthest round the terminator.
         let soft = mix(at.detail, at.normal, 0.5);
         let cosine = dot(soft, lit.to_light);
         let reach = frame.wrap * vec3f(1.0, 0.45, 0.3);
-        diffuse += mix(0.25, 1.0, share) * lit.irradiance * vec3f(
+        diffuse += mix(0.25, 1.0, shares[k]) * lit.irradiance * vec3f(
             wrapped(cosine, reach.x),
             wrapped(cosine, reach.y),
             wrapped(cosine, reach.z),
         );
     }
+    let single = single_scattering(ray, shares, bottoms);
     let color = mix(deep, at.outer.rgb, at.outer.a);
     let tint = mix(vec3f(1.0), 2.2 * color, frame.color_blend);
     let scattered = tint * single + frame.multiple_scattering * color * diffuse / PI;

@@ -190,6 +190,7 @@ impl FramePasses {
             shadow_view,
             shadow_sampler,
             has_shadow: shadow.is_some(),
+            light_count: lights.len(),
         };
         let light_map = if scene.surface.kind == SurfaceKind::Gooey {
             Some(LightMap::new(

@@ -28,6 +28,8 @@ pub struct SurfaceInputs<'a> {
     pub shadow_sampler: &'a wgpu::Sampler,
     /// Whether it is one.
     pub has_shadow: bool,
+    /// Lights of the scene.
+    pub light_count: usize,
 }
 
 /// The bindings of `shaders/surface_vertex.wgsl`, in its order.
@@ -101,6 +103,7 @@ impl Surface {
             constants.extend([
                 ("HAS_PLANES", flag(inputs.has_planes)),
                 ("SAMPLES", f64::from(section.samples)),
+                ("LIGHTS", inputs.light_count as f64),
                 (
                     "PUBLISHED",
                     flag(section.quadrature == Quadrature::Published),
