@@ -25,11 +25,10 @@ fn fragment(in: Varyings) -> @location(0) vec4f {
 
     // The inner albedo blurs with the way through the outer layer.
     let spread = 0.35 * shift.w * vec2f(length(in.gradient_u), length(in.gradient_v));
-    var inner = 2.0 * textureSample(inner_map, linear_sampler, uv).rgb;
-    inner += textureSampleLevel(inner_map, linear_sampler, uv + spread * vec2f(0.87, 0.5), 1.0).rgb;
-    inner += textureSampleLevel(inner_map, linear_sampler, uv + spread * vec2f(-0.87, 0.5), 1.0).rgb;
-    inner += textureSampleLevel(inner_map, linear_sampler, uv - spread * vec2f(0.0, 1.0), 1.0).rgb;
-    inner *= 0.2;
+    var inner = color_at(inner_map, uv + spread * vec2f(0.87, 0.5)).rgb;
+    inner += color_at(inner_map, uv + spread * vec2f(-0.87, 0.5)).rgb;
+    inner += color_at(inner_map, uv - spread * vec2f(0.0, 1.0)).rgb;
+    inner /= 3.0;
 
     let blurred = textureSampleLevel(light_map, linear_sampler, uv, 0.0);
     let inner_light = blurred.rgb / max(blurred.a, 1e-3);
@@ -38,7 +37,7 @@ fn fragment(in: Varyings) -> @location(0) vec4f {
     var outer_light = vec3f(0.05, 0.055, 0.06);
     for (var k = 0u; k < frame.light_count; k += 1u) {
         let lit = light_at(frame.lights[k], in.world);
-        let share = select(1.0, shadow, frame.lights[k].power.w > 0.0);
+        let share = select(1.0, shadow, k == 0u);
         outer_light += share * lit.irradiance * wrapped(dot(at.detail, lit.to_light), 0.0);
     }
     let opacity = clamp(at.outer.a * frame.outer_opacity, 0.0, 1.0);

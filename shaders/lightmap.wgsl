@@ -26,7 +26,7 @@ fn lightmap_fragment(in: Varyings) -> @location(0) vec4f {
     var sum = vec3f(0.05, 0.055, 0.06);
     for (var k = 0u; k < frame.light_count; k += 1u) {
         let lit = light_at(frame.lights[k], in.world);
-        let share = select(1.0, shadow, frame.lights[k].power.w > 0.0);
+        let share = select(1.0, shadow, k == 0u);
         sum += share * lit.irradiance * wrapped(dot(normal, lit.to_light), 0.15);
     }
     return vec4f(sum, 1.0);

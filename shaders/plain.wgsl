@@ -16,7 +16,7 @@ fn fragment(in: Varyings) -> @location(0) vec4f {
     var diffuse = vec3f(0.06);
     for (var k = 0u; k < frame.light_count; k += 1u) {
         let lit = light_at(frame.lights[k], in.world);
-        let share = select(1.0, shadow, frame.lights[k].power.w > 0.0);
+        let share = select(1.0, shadow, k == 0u);
         diffuse += share * lit.irradiance * wrapped(dot(at.detail, lit.to_light), 0.0);
     }
     return vec4f(at.outer.rgb * diffuse / PI + wet(in, at, shadow), 1.0);

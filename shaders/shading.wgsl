@@ -15,7 +15,7 @@
 struct Light {
     // Unit direction to a far light (w = 0) or place of a near one [m] (w = 1).
     place: vec4f,
-    // Irradiance [W/m2] or, of a near light, intensity [W/sr]; w = 1 if it casts shadows.
+    // Irradiance [W/m2] or, of a near light, intensity [W/sr]. The first light is the one with shadows.
     power: vec4f,
 }
 
@@ -43,7 +43,8 @@ struct Frame {
     light_map_texel: f32,
     shadow_texel_m: f32,
     uv_per_m: f32,
-    pad0: f32,
+    // Level of the maps whose texels are as large as a pixel.
+    map_level: f32,
 }
 
 const PI: f32 = 3.14159265;

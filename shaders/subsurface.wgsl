@@ -43,6 +43,58 @@ fn depth_to_light(below: f32, cosine: f32, bottoms: vec4f, sigma_t: mat4x3f) -> 
     return select(depth, vec3f(60.0), cosine <= 1e-3);
 }
 
+// One light along the march. Each has a variable of its own: a list that is stepped through by a counter lies in
+// memory on software adapters, and costs three times as much.
+struct Beam {
+    to_light: vec3f,
+    irradiance: vec3f,
+    // Phase function of each layer between this light and the eye.
+    phases: vec4f,
+    // Optical depth from light to eye by way of the last node, and exp of its negative.
+    depth: vec3f,
+    transmittance: vec3f,
+}
+
+// What all lights share at a node.
+struct Node {
+    // Unit normal of the plane, and how far below it the node lies [m].
+    normal: vec3f,
+    below: f32,
+    bottoms: vec4f,
+    // How much of the step that ends here each layer fills.
+    content: vec4f,
+    eye_depth: vec3f,
+    step: f32,
+}
+
+fn beam(ray: Ray, index: u32, share: f32, bottoms: vec4f, sigma_t: mat4x3f) -> Beam {
+    let lit = light_at(frame.lights[index], ray.position);
+    let cosine = dot(lit.to_light, ray.to_eye);
+    let phases = vec4f(
+        phase(cosine, frame.scattering[0].w),
+        phase(cosine, frame.scattering[1].w),
+        phase(cosine, frame.scattering[2].w),
+        phase(cosine, frame.scattering[3].w),
+    );
+    let depth = depth_to_light(0.0, dot(ray.normal, lit.to_light), bottoms, sigma_t);
+    return Beam(lit.to_light, share * lit.irradiance, phases, depth, exp(-depth));
+}
+
+// Light that the step which ends at `node` sends to the eye.
+fn gather(beam: ptr<function, Beam>, node: Node, sigma_t: mat4x3f, sigma_s: mat4x3f) -> vec3f {
+    let cosine = dot(node.normal, (*beam).to_light);
+    let depth = node.eye_depth + depth_to_light(node.below, cosine, node.bottoms, sigma_t);
+    let transmittance = exp(-depth);
+    var mean = (*beam).transmittance;
+    if PUBLISHED == 0u {
+        mean = piece((*beam).depth, depth, (*beam).transmittance, transmittance);
+    }
+    let emitted = sigma_s * (node.content * (*beam).phases);
+    (*beam).depth = depth;
+    (*beam).transmittance = transmittance;
+    return node.step * (*beam).irradiance * emitted * mean;
+}
+
 // Radiance [W/(m2 sr)] scattered once towards the eye; `shares` is how much of each light arrives.
 fn single_scattering(ray: Ray, shares: vec4f, bottoms_p: vec4f) -> vec3f {
     let sigma_t = mat4x3f(
@@ -57,29 +109,23 @@ fn single_scattering(ray: Ray, shares: vec4f, bottoms_p: vec4f) -> vec3f {
         frame.scattering[2].xyz,
         frame.scattering[3].xyz,
     );
-    var to_light: array<vec3f, 4>;
-    var arriving: array<vec3f, 4>;
-    var phases: array<vec4f, 4>;
-    var before: array<vec3f, 4>;
-    var before_e: array<vec3f, 4>;
-    for (var k = 0u; k < LIGHTS; k += 1u) {
-        let lit = light_at(frame.lights[k], ray.position);
-        let cosine = dot(lit.to_light, ray.to_eye);
-        to_light[k] = lit.to_light;
-        arriving[k] = shares[k] * lit.irradiance;
-        phases[k] = vec4f(
-            phase(cosine, frame.scattering[0].w),
-            phase(cosine, frame.scattering[1].w),
-            phase(cosine, frame.scattering[2].w),
-            phase(cosine, frame.scattering[3].w),
-        );
-        before[k] = depth_to_light(0.0, dot(ray.normal, lit.to_light), bottoms_p, sigma_t);
-        before_e[k] = exp(-before[k]);
+    var beam_0 = beam(ray, 0u, shares.x, bottoms_p, sigma_t);
+    var beam_1: Beam;
+    var beam_2: Beam;
+    var beam_3: Beam;
+    if LIGHTS > 1u {
+        beam_1 = beam(ray, 1u, shares.y, bottoms_p, sigma_t);
+    }
+    if LIGHTS > 2u {
+        beam_2 = beam(ray, 2u, shares.z, bottoms_p, sigma_t);
+    }
+    if LIGHTS > 3u {
+        beam_3 = beam(ray, 3u, shares.w, bottoms_p, sigma_t);
     }
     let clearest = min(min(sigma_t[1].x, sigma_t[1].y), sigma_t[1].z);
     let reach = min(frame.layer_depth_max_m / ray.n_v, 8.0 / clearest);
     var sum = vec3f(0.0);
-    var to_eye_depth = vec3f(0.0);
+    var eye_depth = vec3f(0.0);
     var bottoms = bottoms_p;
     var t = 0.0;
     for (var i = 1u; i <= SAMPLES; i += 1u) {
@@ -90,24 +136,25 @@ fn single_scattering(ray: Ray, shares: vec4f, bottoms_p: vec4f) -> vec3f {
         let blend = next / reach;
         let bottoms_next = bottoms_at(ray, offset);
         let n = normalize(mix(ray.normal, ray.plane.xyz, blend));
-        let below = blend * ray.plane.w - dot(n, offset);
         var content = filled(t * ray.n_v, next * ray.n_v, 0.5 * (bottoms + bottoms_next));
         if PUBLISHED != 0u {
             // The layer at the start of the step stands for all of it.
             let layer = layer_at(t * ray.n_v, bottoms);
             content = vec4f(vec4u(layer) == vec4u(0u, 1u, 2u, 3u));
         }
-        let eye_next = to_eye_depth + step * (sigma_t * content);
-        for (var k = 0u; k < LIGHTS; k += 1u) {
-            let a = eye_next + depth_to_light(below, dot(n, to_light[k]), bottoms_next, sigma_t);
-            let e = exp(-a);
-            let emitted = sigma_s * (content * phases[k]);
-            let mean = select(piece(before[k], a, before_e[k], e), before_e[k], PUBLISHED != 0u);
-            sum += step * arriving[k] * emitted * mean;
-            before[k] = a;
-            before_e[k] = e;
+        eye_depth += step * (sigma_t * content);
+        let below = blend * ray.plane.w - dot(n, offset);
+        let node = Node(n, below, bottoms_next, content, eye_depth, step);
+        sum += gather(&beam_0, node, sigma_t, sigma_s);
+        if LIGHTS > 1u {
+            sum += gather(&beam_1, node, sigma_t, sigma_s);
         }
-        to_eye_depth = eye_next;
+        if LIGHTS > 2u {
+            sum += gather(&beam_2, node, sigma_t, sigma_s);
+        }
+        if LIGHTS > 3u {
+            sum += gather(&beam_3, node, sigma_t, sigma_s);
+        }
         t = next;
         bottoms = bottoms_next;
     }
@@ -131,19 +178,20 @@ fn fragment(in: Varyings) -> @location(0) vec4f {
     let bottoms = bottoms_at(ray, vec3f(0.0));
     let sunk = -(0.35 * frame.layer_depth_max_m / max(at.n_v, 0.35)) * at.to_eye;
     let deep_uv = in.uv + vec2f(dot(sunk, in.gradient_u), dot(sunk, in.gradient_v));
-    let deep = textureSample(inner_map, linear_sampler, deep_uv).rgb;
+    let deep = color_at(inner_map, deep_uv).rgb;
     let shadow = unshadowed(in.world, at.normal);
 
-    var shares = vec4f(1.0);
+    // Only the first light casts shadows.
+    let shares = vec4f(shadow, 1.0, 1.0, 1.0);
     var diffuse = vec3f(0.05, 0.055, 0.06);
     for (var k = 0u; k < LIGHTS; k += 1u) {
         let lit = light_at(frame.lights[k], in.world);
-        shares[k] = select(1.0, shadow, frame.lights[k].power.w > 0.0);
+        let share = select(1.0, shadow, k == 0u);
         // Red light wanders farthest, so it reaches farthest round the terminator.
         let soft = mix(at.detail, at.normal, 0.5);
         let cosine = dot(soft, lit.to_light);
         let reach = frame.wrap * vec3f(1.0, 0.45, 0.3);
-        diffuse += mix(0.25, 1.0, shares[k]) * lit.irradiance * vec3f(
+        diffuse += mix(0.25, 1.0, share) * lit.irradiance * vec3f(
             wrapped(cosine, reach.x),
             wrapped(cosine, reach.y),
             wrapped(cosine, reach.z),

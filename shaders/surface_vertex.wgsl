@@ -67,7 +67,7 @@ fn vertex(@builtin(vertex_index) vertex: u32) -> Varyings {
     return surface_vertex(vertex, frame.clip_from_world * vec4f(world.xyz, 1.0));
 }
 
-// Share of the first light that reaches `x`: four taps of the shadow map, moved off the surface by
+// Share of the first light that reaches `x`: two taps of the shadow map, moved off the surface by
 // about a texel so that it does not shadow itself.
 fn unshadowed(x: vec3f, normal: vec3f) -> f32 {
     if HAS_SHADOW == 0u {
@@ -76,13 +76,16 @@ fn unshadowed(x: vec3f, normal: vec3f) -> f32 {
     let off = x + 2.0 * frame.shadow_texel_m * normal;
     let clip = frame.shadow_from_world * vec4f(off, 1.0);
     let uv = clip.xy * vec2f(0.5, -0.5) + 0.5;
-    let texel = 0.75 / f32(textureDimensions(shadow_map).x);
-    var sum = 0.0;
-    for (var k = 0u; k < 4u; k += 1u) {
-        let corner = vec2f(f32(k & 1u), f32(k >> 1u)) * 2.0 - 1.0;
-        sum += textureSampleCompareLevel(shadow_map, shadow_sampler, uv + texel * corner, clip.z);
-    }
-    return 0.25 * sum;
+    let aside = 0.6 / vec2f(textureDimensions(shadow_map));
+    return 0.5 * textureSampleCompareLevel(shadow_map, shadow_sampler, uv + aside, clip.z)
+        + 0.5 * textureSampleCompareLevel(shadow_map, shadow_sampler, uv - aside, clip.z);
+}
+
+// Colour maps hold square roots of linear light, which a square undoes for less than sRGB costs. The level is
+// the same for the whole frame: that of the organ's distance.
+fn color_at(map: texture_2d<f32>, uv: vec2f) -> vec4f {
+    let texel = textureSampleLevel(map, linear_sampler, uv, frame.map_level);
+    return vec4f(texel.rgb * texel.rgb, texel.a);
 }
 
 struct Place {
@@ -98,10 +101,10 @@ fn place(in: Varyings) -> Place {
     let tangent = normalize(in.tangent.xyz);
     // Green of the map grows towards smaller v.
     let up = cross(normal, tangent) * in.tangent.w;
-    let texel = textureSample(normal_map, linear_sampler, in.uv).xyz * 2.0 - 1.0;
+    let texel = textureSampleLevel(normal_map, linear_sampler, in.uv, frame.map_level).xyz * 2.0 - 1.0;
     let detail = normalize(frame.relief * (texel.x * tangent - texel.y * up) + texel.z * normal);
     let to_eye = normalize(frame.eye.xyz - in.world);
-    let outer = textureSample(outer_map, linear_sampler, in.uv);
+    let outer = color_at(outer_map, in.uv);
     return Place(normal, detail, to_eye, max(dot(normal, to_eye), 1e-3), outer);
 }
 
@@ -110,7 +113,7 @@ fn wet(in: Varyings, at: Place, shadow: f32) -> vec3f {
     var sum = vec3f(0.0);
     for (var k = 0u; k < frame.light_count; k += 1u) {
         let lit = light_at(frame.lights[k], in.world);
-        let share = select(1.0, shadow, frame.lights[k].power.w > 0.0);
+        let share = select(1.0, shadow, k == 0u);
         sum += share * lit.irradiance * film(at.detail, lit.to_light, at.to_eye, frame.roughness);
     }
     let mirrored = reflect(-at.to_eye, at.detail);

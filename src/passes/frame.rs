@@ -116,6 +116,7 @@ pub struct FramePasses {
     lights: Vec<PlacedLight>,
     knobs: SurfaceSection,
     uv_per_m: f32,
+    map_size_px: u32,
     size: [u32; 2],
 }
 
@@ -170,11 +171,12 @@ impl FramePasses {
             "frame",
             &FrameUniform::new(
                 &view,
-                1.0,
+                size,
                 &lights,
                 &scene.surface,
                 Mat4::IDENTITY,
                 uv_per_m,
+                tissue.size_px,
             ),
         );
         let maps = Maps::new(gpu, tissue);
@@ -221,6 +223,7 @@ impl FramePasses {
             lights,
             knobs: scene.surface.clone(),
             uv_per_m,
+            map_size_px: tissue.size_px,
             size,
         })
     }
@@ -257,18 +260,18 @@ impl FramePasses {
         encoder: &mut wgpu::CommandEncoder,
         timer: &mut Timer,
     ) {
-        let aspect = self.size[0] as f32 / self.size[1] as f32;
         let shadow_from_world = match (&self.shadow, self.lights.first()) {
             (Some(_), Some(light)) => shadow_from_world(light.place, points),
             _ => Mat4::IDENTITY,
         };
         let frame = FrameUniform::new(
             view,
-            aspect,
+            self.size,
             &self.lights,
             &self.knobs,
             shadow_from_world,
             self.uv_per_m,
+            self.map_size_px,
         );
         gpu.queue
             .write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));

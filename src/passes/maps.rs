@@ -6,11 +6,11 @@ use image::RgbaImage;
 
 /// Views of the four maps, and how they are sampled.
 pub struct Maps {
-    /// sRGB colour of the outer layer, opacity in alpha.
+    /// Square roots of the linear colour of the outer layer, opacity in alpha.
     pub outer: wgpu::TextureView,
     /// Tangent-space normals.
     pub normal: wgpu::TextureView,
-    /// sRGB colour of the deep tissue.
+    /// Square roots of the linear colour of the deep tissue.
     pub inner: wgpu::TextureView,
     /// Lower boundaries of the four layers, as shares of the deepest.
     pub layers: wgpu::TextureView,
@@ -21,13 +21,11 @@ pub struct Maps {
 impl Maps {
     /// Uploads `maps`.
     pub fn new(gpu: &Gpu, maps: &TissueMaps) -> Self {
-        let srgb = wgpu::TextureFormat::Rgba8UnormSrgb;
-        let linear = wgpu::TextureFormat::Rgba8Unorm;
         Self {
-            outer: upload(gpu, "outer map", &maps.outer, srgb),
-            normal: upload(gpu, "normal map", &maps.normal, linear),
-            inner: upload(gpu, "inner map", &maps.inner, srgb),
-            layers: upload(gpu, "layer map", &maps.layers, linear),
+            outer: upload(gpu, "outer map", square_roots(&maps.outer)),
+            normal: upload(gpu, "normal map", maps.normal.clone()),
+            inner: upload(gpu, "inner map", square_roots(&maps.inner)),
+            layers: upload(gpu, "layer map", maps.layers.clone()),
             sampler: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("maps"),
                 mag_filter: wgpu::FilterMode::Linear,
@@ -40,11 +38,33 @@ impl Maps {
     }
 }
 
+/// sRGB colours as square roots of linear light: a software adapter undoes those for a multiplication,
+/// where an sRGB texture costs it a polynomial for each of four texels.
+fn square_roots(image: &RgbaImage) -> RgbaImage {
+    let table: Vec<u8> = (0..=255u32)
+        .map(|encoded| {
+            let c = encoded as f32 / 255.0;
+            let linear = if c <= 0.04045 {
+                c / 12.92
+            } else {
+                ((c + 0.055) / 1.055).powf(2.4)
+            };
+            (255.0 * linear.sqrt()).round() as u8
+        })
+        .collect();
+    let mut image = image.clone();
+    for texel in image.pixels_mut() {
+        for channel in &mut texel.0[..3] {
+            *channel = table[*channel as usize];
+        }
+    }
+    image
+}
+
 fn upload(
     gpu: &Gpu,
     label: &str,
-    image: &RgbaImage,
-    format: wgpu::TextureFormat,
+    image: RgbaImage,
 ) -> wgpu::TextureView {
     // Four levels: further ones would mix charts of the atlas.
     let levels = 4.min(1 + image.width().min(image.height()).ilog2());
@@ -58,11 +78,11 @@ fn upload(
         mip_level_count: levels,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
-        format,
+        format: wgpu::TextureFormat::Rgba8Unorm,
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     });
-    let mut level_image = image.clone();
+    let mut level_image = image;
     for level in 0..levels {
         if level > 0 {
             level_image = halved(&level_image);

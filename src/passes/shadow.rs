@@ -6,7 +6,7 @@ use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, uniform};
 use glam::Mat4;
 
 /// Side of the map [px].
-pub const SIZE_PX: u32 = 1024;
+pub const SIZE_PX: u32 = 768;
 
 /// Depth of the surface as the light sees it.
 pub struct Shadow {

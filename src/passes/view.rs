@@ -101,7 +101,7 @@ pub struct FrameUniform {
     pub light_map_texel: f32,
     pub shadow_texel_m: f32,
     pub uv_per_m: f32,
-    pub pad0: f32,
+    pub map_level: f32,
 }
 
 /// The lights of a scene, the one that casts shadows first.
@@ -117,15 +117,17 @@ pub fn placed_lights(scene: &Scene, rest: &RestBox) -> Vec<PlacedLight> {
 }
 
 impl FrameUniform {
-    /// Camera, lights and knobs of one frame.
+    /// Camera, lights and knobs of one frame of a picture of `size` [px] with maps of `map_size_px`.
     pub fn new(
         view: &View,
-        aspect: f32,
+        size: [u32; 2],
         lights: &[PlacedLight],
         surface: &SurfaceSection,
         shadow_from_world: Mat4,
         uv_per_m: f32,
+        map_size_px: u32,
     ) -> Self {
+        let aspect = size[0] as f32 / size[1] as f32;
         let light = |k: usize| match lights.get(k) {
             None => LightUniform {
                 place: [0.0; 4],
@@ -175,9 +177,18 @@ impl FrameUniform {
             light_map_texel: 1.0 / surface.light_map_size_px as f32,
             shadow_texel_m: shadow_width_m / super::shadow::SIZE_PX as f32,
             uv_per_m,
-            pad0: 0.0,
+            map_level: map_level(view, size[1], uv_per_m, map_size_px),
         }
     }
+}
+
+/// Level of maps of `map_size_px` at which a texel is about as large as a pixel of a picture that is
+/// `height_px` high, at the distance of the view's target.
+fn map_level(view: &View, height_px: u32, uv_per_m: f32, map_size_px: u32) -> f32 {
+    let pixel_m =
+        2.0 * view.eye.distance(view.target) * (0.5 * view.fov_y).tan() / height_px as f32;
+    let texels = pixel_m * uv_per_m * map_size_px as f32;
+    texels.max(1e-6).log2().round().clamp(0.0, 3.0)
 }
 
 #[cfg(test)]
