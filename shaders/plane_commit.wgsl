@@ -19,7 +19,7 @@ struct Params {
 @group(0) @binding(2) var now: texture_2d<f32>;
 @group(0) @binding(3) var committed: texture_storage_2d<rgba32float, write>;
 
-@compute @workgroup_size(16)
+@compute @workgroup_size(8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let leaf = id.x;
     if 32u * leaf >= params.slot_count {

@@ -4,7 +4,7 @@
 //
 // d is measured from an origin near the patch, in units of about its size. Sums are whole numbers
 // of quanta 1/q, so what is taken out is exactly what was put in: nothing drifts. A patch of which a
-// quarter moved, or that has a member beyond 4 units, is summed anew about its point.
+// sixth moved, or that has a member beyond 4 units, is summed anew about its point.
 //
 // Source:  François et al., "Subsurface Texture Mapping" (2006), section 4, for the plane; Knuth,
 //          "The Art of Computer Programming" vol. 2, 4.2.2, on what sums of floats lose.
@@ -100,7 +100,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     var sum = vec3i(0);
     var squares = vec3i(0);
     var products = vec3i(0);
-    var usable = 4u * moved_count < member_count;
+    var usable = 6u * moved_count < member_count;
     if usable {
         origin = sums[slot].origin;
         per_m = sums[slot].per_m;
@@ -123,7 +123,6 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     }
     if !usable {
         origin = here.xyz;
-        var reach = vec3f(0.0);
         var sum_m = vec3f(0.0);
         var squares_m2 = vec3f(0.0);
         var products_m2 = vec3f(0.0);
@@ -132,14 +131,15 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             for (var bits = block.y; bits != 0u; bits &= bits - 1u) {
                 let member = entry(32u * block.x + firstTrailingBit(bits));
                 let d = textureLoad(now, member, 0).xyz - origin;
-                reach = max(reach, abs(d));
                 sum_m += d;
                 squares_m2 += d * d;
                 products_m2 += d.xxy * d.yzz;
             }
         }
+        // No member is farther than the root of the sum of squares.
+        let reach = sqrt(longest_side(squares_m2));
         per_m = params.rest_per_m;
-        for (var i = 0u; i < DOUBLINGS_MAX && longest_side(reach) * per_m > RANGE; i += 1u) {
+        for (var i = 0u; i < DOUBLINGS_MAX && reach * per_m > RANGE; i += 1u) {
             per_m *= 0.5;
         }
         sum = rounded(sum_m * per_m);

@@ -69,7 +69,7 @@ fn list_patches(run: u32) {
     }
 }
 
-@compute @workgroup_size(16)
+@compute @workgroup_size(8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let leaf = id.x;
     let first = 32u * leaf;

@@ -810,7 +810,7 @@ fn incremental_plane_parity_check_rejects_sabotaged_kernels() {
             "rounded(new_d * new_d)",
         ),
         (1, "origin - here.xyz + mean / per_m", "mean / per_m"),
-        (1, "4u * moved_count < member_count", "true"),
+        (1, "6u * moved_count < member_count", "true"),
         (2, "entry(leaf), 0).x", "entry(leaf), 0).x & 65535u"),
     ] {
         let mut sources = kernels.clone();

@@ -18,7 +18,7 @@ const RANGE: f32 = 4.0;
 const DOUBLINGS_MAX: u32 = 32;
 /// A patch of which one in so many members moved is summed anew, which reads each member once where
 /// moving it reads it twice; the same in `plane_incremental.wgsl`.
-const SUM_ANEW_SHARE: u32 = 4;
+const SUM_ANEW_SHARE: u32 = 6;
 
 /// Sums over one patch. Mirror of `Sums` in `shaders/plane_incremental.wgsl`.
 #[repr(C)]
@@ -171,7 +171,6 @@ impl RunningPlanes {
     /// Sums all members about where the patch's point is now, in the smallest unit that will do.
     fn sum_anew(&self, slot: usize, patches: &Patches) -> PatchSums {
         let origin = self.now[slot];
-        let mut reach = Vec3::ZERO;
         let mut total = Moments::of(Vec3::ZERO);
         for member in patches
             .lists
@@ -180,15 +179,16 @@ impl RunningPlanes {
             .flat_map(|block| block.slots())
         {
             let d = self.now[member] - origin;
-            reach = reach.max(d.abs());
             let moments = Moments::of(d);
             total.sum += moments.sum;
             total.squares += moments.squares;
             total.products += moments.products;
         }
+        // No member is farther than the root of the sum of squares.
+        let reach = total.squares.max_element().sqrt();
         let mut per_m = self.rest_per_m;
         for _ in 0..DOUBLINGS_MAX {
-            if reach.max_element() * per_m > RANGE {
+            if reach * per_m > RANGE {
                 per_m *= 0.5;
             }
         }

@@ -166,11 +166,11 @@ impl Site {
     }
 }
 
-/// Points sorted so that each run of 32 is compact: halved along the longest side of their box
-/// until 32 are left.
+/// Points sorted so that each run of 32, and within it of 16, 8 and 4, is compact: halved along the
+/// longest side of their box until 4 are left.
 fn spatial_order(points: &[Vec3]) -> Vec<u32> {
     fn halve(points: &[Vec3], order: &mut [u32]) {
-        if order.len() <= LEAF_SLOTS {
+        if order.len() <= 4 {
             order.sort_unstable();
             return;
         }
@@ -178,7 +178,11 @@ fn spatial_order(points: &[Vec3]) -> Vec<u32> {
         let low = places().fold(Vec3::INFINITY, Vec3::min);
         let high = places().fold(Vec3::NEG_INFINITY, Vec3::max);
         let axis = (high - low).max_position();
-        let half = (order.len() / 2).next_multiple_of(LEAF_SLOTS);
+        let half = if order.len() > LEAF_SLOTS {
+            (order.len() / 2).next_multiple_of(LEAF_SLOTS)
+        } else {
+            (order.len() / 2).next_power_of_two()
+        };
         order.select_nth_unstable_by(half, |&a, &b| {
             points[a as usize][axis]
                 .total_cmp(&points[b as usize][axis])

@@ -16,7 +16,7 @@ use glam::Vec3;
 /// Of the update, a thread a patch; the same in `plane_moved.wgsl`, which counts workgroups.
 const PATCH_WORKGROUP_SIZE: u32 = 64;
 /// Of the other two, a thread a leaf: small, since there are few leaves to share out.
-const LEAF_WORKGROUP_SIZE: u32 = 16;
+const LEAF_WORKGROUP_SIZE: u32 = 8;
 
 /// Mirror of `Params` in `shaders/plane_moved.wgsl` and `shaders/plane_commit.wgsl`.
 #[repr(C)]
@@ -45,7 +45,7 @@ pub struct PlaneIncremental {
     commit_kernel: Kernel,
     leaf_workgroups: u32,
     /// Points moved, planes fitted and patches listed in the frame, then a mark for each slot.
-    pub frame: wgpu::Buffer,
+    frame: wgpu::Buffer,
     /// How large the update is to be, as the first kernel found.
     update_workgroups: wgpu::Buffer,
     /// Sums of every patch, `[PatchSums; slots]`.
