@@ -15,17 +15,17 @@ struct Params {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<storage, read> moved: array<u32>;
+@group(0) @binding(1) var moved: texture_2d<u32>;
 @group(0) @binding(2) var now: texture_2d<f32>;
 @group(0) @binding(3) var committed: texture_storage_2d<rgba32float, write>;
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(8)
 fn main(@builtin(global_invocation_id) id: vec3u) {
     let leaf = id.x;
     if 32u * leaf >= params.slot_count {
         return;
     }
-    for (var bits = moved[leaf]; bits != 0u; bits &= bits - 1u) {
+    for (var bits = textureLoad(moved, entry(leaf), 0).x; bits != 0u; bits &= bits - 1u) {
         let slot = entry(32u * leaf + firstTrailingBit(bits));
         textureStore(committed, slot, textureLoad(now, slot, 0));
     }

@@ -1,142 +1,158 @@
-// Brings the marked patches' moments up to date with what moved, and fits their planes.
+// Brings the listed patches' moments up to date with what moved, and fits their planes.
 //
-//   S <- S - round(q f(d_before)) + round(q f(d_now))     f(d): d, and the six products of d
+//   S <- S - round(q f(d_old)) + round(q f(d_new))     f(d): d, and the six products of d
 //
 // d is measured from an origin near the patch, in units of about its size. Sums are whole numbers
-// of quanta 1/q, so what is taken out is exactly what was put in: nothing drifts. A patch of which
-// half moved, or that has a member beyond 4 units, is summed anew about its point.
+// of quanta 1/q, so what is taken out is exactly what was put in: nothing drifts. A patch of which a
+// sixth moved, or that has a member beyond 4 units, is summed anew about its point.
 //
 // Source:  François et al., "Subsurface Texture Mapping" (2006), section 4, for the plane; Knuth,
 //          "The Art of Computer Programming" vol. 2, 4.2.2, on what sums of floats lose.
 // Twin:    src/geom/moments.rs, fn update
 // Parity:  tests/gpu_parity.rs, fn incremental_planes_match_the_cpu_twin
-// Threads: one per slot; each gathers over the blocks of its patch, so a fixed order.
+// Threads: one per listed patch; each gathers over the blocks of its patch, so a fixed order.
 // Units:   metres; the result is a unit normal and an offset in metres.
 // Fails:   as plane_fit.wgsl; and a plane lags by what its members moved within the tolerance.
 
 const RANGE: f32 = 4.0;
 const DOUBLINGS_MAX: u32 = 32u;
+const ROUNDING: f32 = 12582912.0;
 
 struct Params {
-    slot_count: u32,
     quanta: f32,
     rest_per_m: f32,
     pad0: u32,
-}
-
-struct Patch {
-    origin: vec3f,
-    per_m: f32,
-    sum: vec3i,
-    point: u32,
-    squares: vec3i,
-    first_block: u32,
-    products: vec3i,
-    end_block: u32,
+    pad1: u32,
 }
 
 struct Frame {
     moved: atomic<u32>,
     refitted: atomic<u32>,
-    marked: array<atomic<u32>>,
+    listed: atomic<u32>,
+}
+
+struct Sums {
+    origin: vec3f,
+    per_m: f32,
+    sum: vec3i,
+    pad0: u32,
+    // xx, yy, zz
+    squares: vec3i,
+    pad1: u32,
+    // xy, xz, yz
+    products: vec3i,
+    pad2: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-// where the sums have each slot, and where they are to have it
+// where the sums have each slot and where they are to have it, with its point in w
 @group(0) @binding(1) var committed: texture_2d<f32>;
 @group(0) @binding(2) var now: texture_2d<f32>;
-@group(0) @binding(3) var<storage, read> moved: array<u32>;
+// which slots of each leaf moved
+@group(0) @binding(3) var moved: texture_2d<u32>;
+// first block and end of each slot's patch
+@group(0) @binding(4) var ranges: texture_2d<u32>;
 // leaf, members: bit i stands for slot 32 leaf + i
-@group(0) @binding(4) var blocks: texture_2d<u32>;
-@group(0) @binding(5) var<storage, read> normals: array<vec4f>;
-@group(0) @binding(6) var<storage, read_write> patches: array<Patch>;
-@group(0) @binding(7) var<storage, read_write> frame: Frame;
-@group(0) @binding(8) var<storage, read_write> planes: array<vec4f>;
+@group(0) @binding(5) var blocks: texture_2d<u32>;
+@group(0) @binding(6) var<storage, read> listed: array<u32>;
+@group(0) @binding(7) var<storage, read> normals: array<vec4f>;
+@group(0) @binding(8) var<storage, read_write> sums: array<Sums>;
+@group(0) @binding(9) var<storage, read_write> frame: Frame;
+@group(0) @binding(10) var<storage, read_write> planes: array<vec4f>;
 
 fn rounded(d: vec3f) -> vec3i {
     return vec3i(round(d * params.quanta));
 }
 
-fn in_range(d: vec3f) -> bool {
-    return max(max(abs(d.x), abs(d.y)), abs(d.z)) <= RANGE;
+// rounded(to) - rounded(old): added to 1.5 2^23, a float shows its whole number in its last bits.
+// Within RANGE neither passes 2^22, and multiplying by a power of two is exact, fused or not.
+fn change(to: vec3f, old: vec3f) -> vec3i {
+    let to_bits = bitcast<vec3i>(to * params.quanta + ROUNDING);
+    return to_bits - bitcast<vec3i>(old * params.quanta + ROUNDING);
+}
+
+fn longest_side(d: vec3f) -> f32 {
+    return max(max(abs(d.x), abs(d.y)), abs(d.z));
 }
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3u) {
-    let slot = id.x;
-    if slot >= params.slot_count {
+    if id.x >= atomicLoad(&frame.listed) {
         return;
     }
-    if (atomicLoad(&frame.marked[slot / 32u]) & (1u << (slot % 32u))) == 0u {
-        return;
-    }
-    let first_block = patches[slot].first_block;
-    let end_block = patches[slot].end_block;
+    let slot = listed[id.x];
+    let range = textureLoad(ranges, entry(slot), 0);
     var member_count = 0u;
     var moved_count = 0u;
-    for (var k = first_block; k < end_block; k += 1u) {
-        let block = textureLoad(blocks, entry(k), 0).xy;
+    for (var k = range.x; k < range.y; k += 1u) {
+        let block = textureLoad(blocks, entry(k), 0);
         member_count += countOneBits(block.y);
-        moved_count += countOneBits(block.y & moved[block.x]);
+        moved_count += countOneBits(block.y & textureLoad(moved, entry(block.x), 0).x);
     }
     if moved_count == 0u {
         return;
     }
     atomicAdd(&frame.refitted, 1u);
 
-    var origin = patches[slot].origin;
-    var per_m = patches[slot].per_m;
-    var sum = patches[slot].sum;
-    var squares = patches[slot].squares;
-    var products = patches[slot].products;
-    var usable = 2u * moved_count < member_count;
+    let here = textureLoad(now, entry(slot), 0);
+    var origin = here.xyz;
+    var per_m = params.rest_per_m;
+    var sum = vec3i(0);
+    var squares = vec3i(0);
+    var products = vec3i(0);
+    var usable = 6u * moved_count < member_count;
     if usable {
-        for (var k = first_block; k < end_block; k += 1u) {
-            let block = textureLoad(blocks, entry(k), 0).xy;
-            for (var bits = block.y & moved[block.x]; bits != 0u; bits &= bits - 1u) {
+        origin = sums[slot].origin;
+        per_m = sums[slot].per_m;
+        sum = sums[slot].sum;
+        squares = sums[slot].squares;
+        products = sums[slot].products;
+        for (var k = range.x; k < range.y; k += 1u) {
+            let block = textureLoad(blocks, entry(k), 0);
+            var bits = block.y & textureLoad(moved, entry(block.x), 0).x;
+            for (; bits != 0u; bits &= bits - 1u) {
                 let member = entry(32u * block.x + firstTrailingBit(bits));
                 let old_d = (textureLoad(committed, member, 0).xyz - origin) * per_m;
                 let new_d = (textureLoad(now, member, 0).xyz - origin) * per_m;
-                usable = usable && in_range(new_d);
-                sum += rounded(new_d) - rounded(old_d);
-                squares += rounded(new_d * new_d) - rounded(old_d * old_d);
-                products += rounded(new_d.xxy * new_d.yzz) - rounded(old_d.xxy * old_d.yzz);
+                usable = usable && longest_side(new_d) <= RANGE;
+                sum += change(new_d, old_d);
+                squares += change(new_d * new_d, old_d * old_d);
+                products += change(new_d.xxy * new_d.yzz, old_d.xxy * old_d.yzz);
             }
         }
     }
-    let at = textureLoad(now, entry(slot), 0).xyz;
     if !usable {
-        origin = at;
+        origin = here.xyz;
+        var sum_m = vec3f(0.0);
+        var squares_m2 = vec3f(0.0);
+        var products_m2 = vec3f(0.0);
+        for (var k = range.x; k < range.y; k += 1u) {
+            let block = textureLoad(blocks, entry(k), 0);
+            for (var bits = block.y; bits != 0u; bits &= bits - 1u) {
+                let member = entry(32u * block.x + firstTrailingBit(bits));
+                let d = textureLoad(now, member, 0).xyz - origin;
+                sum_m += d;
+                squares_m2 += d * d;
+                products_m2 += d.xxy * d.yzz;
+            }
+        }
+        // No member is farther than the root of the sum of squares.
+        let reach = sqrt(longest_side(squares_m2));
         per_m = params.rest_per_m;
-        for (var doubling = 0u; doubling < DOUBLINGS_MAX; doubling += 1u) {
-            sum = vec3i(0);
-            squares = vec3i(0);
-            products = vec3i(0);
-            var all_in_range = true;
-            for (var k = first_block; k < end_block; k += 1u) {
-                let block = textureLoad(blocks, entry(k), 0).xy;
-                for (var bits = block.y; bits != 0u; bits &= bits - 1u) {
-                    let member = entry(32u * block.x + firstTrailingBit(bits));
-                    let d = (textureLoad(now, member, 0).xyz - origin) * per_m;
-                    all_in_range = all_in_range && in_range(d);
-                    sum += rounded(d);
-                    squares += rounded(d * d);
-                    products += rounded(d.xxy * d.yzz);
-                }
-            }
-            if all_in_range {
-                break;
-            }
+        for (var i = 0u; i < DOUBLINGS_MAX && reach * per_m > RANGE; i += 1u) {
             per_m *= 0.5;
         }
+        sum = rounded(sum_m * per_m);
+        squares = rounded(squares_m2 * per_m * per_m);
+        products = rounded(products_m2 * per_m * per_m);
+        sums[slot].origin = origin;
+        sums[slot].per_m = per_m;
     }
-    patches[slot].origin = origin;
-    patches[slot].per_m = per_m;
-    patches[slot].sum = sum;
-    patches[slot].squares = squares;
-    patches[slot].products = products;
+    sums[slot].sum = sum;
+    sums[slot].squares = squares;
+    sums[slot].products = products;
 
-    let point = patches[slot].point;
+    let point = u32(here.w);
     let normal = normals[point].xyz;
     if member_count < 3u {
         planes[point] = vec4f(normal, 0.0);
@@ -148,5 +164,5 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         vec3f(squares) * share - mean * mean,
         vec3f(products) * share - mean.xxy * mean.yzz,
     );
-    planes[point] = plane_of_moments(origin - at + mean / per_m, spread, normal);
+    planes[point] = plane_of_moments(origin - here.xyz + mean / per_m, spread, normal);
 }

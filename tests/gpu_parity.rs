@@ -702,6 +702,15 @@ fn wandering(rest: &[Vec3], frame: usize) -> Vec<Vec3> {
         .collect()
 }
 
+/// As [`wandering`], with every ninth point shaken by itself: patches of which few members moved.
+fn shaken(rest: &[Vec3], frame: usize) -> Vec<Vec3> {
+    let mut points = wandering(rest, frame);
+    for (i, point) in points.iter_mut().enumerate().step_by(9) {
+        point.y += 0.001 * ((i + frame) as f32).sin();
+    }
+    points
+}
+
 fn incremental_sources() -> [String; 3] {
     [
         PlaneIncremental::MOVED_WGSL,
@@ -709,6 +718,21 @@ fn incremental_sources() -> [String; 3] {
         PlaneIncremental::COMMIT_WGSL,
     ]
     .map(join)
+}
+
+/// Whether the sums are the same but for the rounding of a patch that was summed anew: 1e-6 of the
+/// members' contributions, of which each is up to 16 units.
+fn sums_alike(sums: &[PatchSums], twin: &RunningPlanes) -> bool {
+    let alike = |a: [i32; 3], b: [i32; 3]| {
+        let room = (1e-5 * 16.0 * twin.quanta).ceil() as i32;
+        (0..3).all(|axis| (a[axis] - b[axis]).abs() <= room)
+    };
+    sums.iter().zip(&twin.sums).all(|(sums, twin)| {
+        (sums.origin, sums.per_m) == (twin.origin, twin.per_m)
+            && alike(sums.sum, twin.sum)
+            && alike(sums.squares, twin.squares)
+            && alike(sums.products, twin.products)
+    })
 }
 
 /// Runs kernel and twin over the same frames; the worst plane difference, and whether all sums and
@@ -741,7 +765,7 @@ fn incremental_difference(
         let counts = pass.counts(gpu).expect("counts can be read");
         let sums: Vec<PatchSums> = read_buffer(gpu, &pass.sums).expect("sums can be read");
         same &= (counts.moved, counts.refitted) == (updated.moved, updated.refitted);
-        same &= sums == twin.patches;
+        same &= sums_alike(&sums, &twin);
         difference = difference.max(worst_plane(&read(gpu, &pass.planes), &twin.planes));
     }
     (difference, same)
@@ -753,7 +777,7 @@ fn incremental_planes_match_the_cpu_twin() {
     for (name, mesh) in surfaces() {
         let body = Body::new(&gpu, mesh);
         let rest = &body.mesh.points;
-        let mut frames: Vec<Vec<Vec3>> = (0..4).map(|i| wandering(rest, 40 * i)).collect();
+        let mut frames: Vec<Vec<Vec3>> = (0..4).map(|i| shaken(rest, 30 * i)).collect();
         frames.push(deformed(rest));
         let (worst, same) =
             incremental_difference(&gpu, &body, 1e-5, &frames, &incremental_sources());
@@ -770,10 +794,11 @@ fn incremental_plane_parity_check_rejects_sabotaged_kernels() {
     let gpu = gpu();
     let body = Body::new(&gpu, wavy(33));
     let rest = &body.mesh.points;
-    let frames: Vec<Vec<Vec3>> = (0..4).map(|i| wandering(rest, 110 + 10 * i)).collect();
+    let frames: Vec<Vec<Vec3>> = (0..4).map(|i| shaken(rest, 110 + 10 * i)).collect();
     let kernels = incremental_sources();
     for (which, from, to) in [
         (0, "block.y", "(block.y & 255u)"),
+        (0, "bits >>= 8u", "bits = 0u"),
         (
             0,
             "textureStore(now, entry(first + i), vec4f(place, old.w));",
@@ -781,12 +806,12 @@ fn incremental_plane_parity_check_rejects_sabotaged_kernels() {
         ),
         (
             1,
-            "rounded(new_d * new_d) - rounded(old_d * old_d)",
+            "change(new_d * new_d, old_d * old_d)",
             "rounded(new_d * new_d)",
         ),
-        (1, "origin - at + mean / per_m", "mean / per_m"),
-        (1, "2u * moved_count < member_count", "true"),
-        (2, "moved[leaf]", "(moved[leaf] & 65535u)"),
+        (1, "origin - here.xyz + mean / per_m", "mean / per_m"),
+        (1, "6u * moved_count < member_count", "true"),
+        (2, "entry(leaf), 0).x", "entry(leaf), 0).x & 65535u"),
     ] {
         let mut sources = kernels.clone();
         sources[which] = sabotaged(&sources[which], from, to);

@@ -7,6 +7,7 @@
 
 use super::patch::{LEAF_SLOTS, Patches};
 use super::plane::{Plane, Spread, plane_of_moments};
+use bytemuck::Zeroable;
 use glam::{IVec3, Vec3};
 
 /// Distance from the origin, in units, up to which a member may be counted; the same in
@@ -15,8 +16,11 @@ const RANGE: f32 = 4.0;
 /// Times the unit may be doubled until all members are in range; the same in
 /// `plane_incremental.wgsl`.
 const DOUBLINGS_MAX: u32 = 32;
+/// A patch of which one in so many members moved is summed anew, which reads each member once where
+/// moving it reads it twice; the same in `plane_incremental.wgsl`.
+const SUM_ANEW_SHARE: u32 = 6;
 
-/// Sums over one patch. Mirror of `Patch` in `shaders/plane_incremental.wgsl`.
+/// Sums over one patch. Mirror of `Sums` in `shaders/plane_incremental.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct PatchSums {
@@ -26,16 +30,13 @@ pub struct PatchSums {
     pub per_m: f32,
     /// Σ d, in quanta.
     pub sum: [i32; 3],
-    /// The point the patch belongs to.
-    pub point: u32,
+    pub pad0: u32,
     /// Σ of xx, yy, zz, in quanta.
     pub squares: [i32; 3],
-    /// Where the patch's blocks start in the lists of [`Patches`].
-    pub first_block: u32,
+    pub pad1: u32,
     /// Σ of xy, xz, yz, in quanta.
     pub products: [i32; 3],
-    /// Where they end.
-    pub end_block: u32,
+    pub pad2: u32,
 }
 
 /// What one update did.
@@ -64,7 +65,7 @@ pub struct RunningPlanes {
     /// Which slots of each leaf moved in the last update.
     pub moved: Vec<u32>,
     /// Sums, by slot.
-    pub patches: Vec<PatchSums>,
+    pub sums: Vec<PatchSums>,
     /// Planes, by point.
     pub planes: Vec<Plane>,
 }
@@ -84,24 +85,11 @@ impl RunningPlanes {
             now: places.clone(),
             before: places,
             moved: vec![0; patches.leaf_count()],
-            patches: Vec::new(),
+            sums: Vec::new(),
             planes: normals.iter().map(|&n| Plane::tangent(n)).collect(),
         };
-        running.patches = (0..patches.order.len())
-            .map(|slot| {
-                let mut sums = PatchSums {
-                    origin: [0.0; 3],
-                    per_m: running.rest_per_m,
-                    sum: [0; 3],
-                    point: patches.order[slot],
-                    squares: [0; 3],
-                    first_block: patches.lists.start[slot],
-                    products: [0; 3],
-                    end_block: patches.lists.start[slot + 1],
-                };
-                running.sum_anew(slot, patches, &mut sums);
-                sums
-            })
+        running.sums = (0..patches.order.len())
+            .map(|slot| running.sum_anew(slot, patches))
             .collect();
         for slot in 0..patches.order.len() {
             running.fit(slot, patches, normals);
@@ -138,12 +126,9 @@ impl RunningPlanes {
             if moved_members == 0 {
                 continue;
             }
-            let mut sums = self.patches[slot];
-            let few = 2 * moved_members < patches.member_count(slot);
-            if !(few && self.sum_moved(patches, &mut sums)) {
-                self.sum_anew(slot, patches, &mut sums);
-            }
-            self.patches[slot] = sums;
+            let few = SUM_ANEW_SHARE * moved_members < patches.member_count(slot);
+            let moved_sums = few.then(|| self.sum_moved(slot, patches)).flatten();
+            self.sums[slot] = moved_sums.unwrap_or_else(|| self.sum_anew(slot, patches));
             self.fit(slot, patches, normals);
             refitted += 1;
         }
@@ -163,50 +148,67 @@ impl RunningPlanes {
         }
     }
 
-    /// Takes moved members out and puts them in where they are now. `false` if one is out of range,
-    /// and the sums are then useless.
-    fn sum_moved(&self, patches: &Patches, sums: &mut PatchSums) -> bool {
+    /// Takes moved members out and puts them in where they are now. `None` if one is out of range.
+    fn sum_moved(&self, slot: usize, patches: &Patches) -> Option<PatchSums> {
+        let mut sums = self.sums[slot];
         let origin = Vec3::from(sums.origin);
-        let mut in_range = true;
-        for block in &patches.lists.blocks[sums.first_block as usize..sums.end_block as usize] {
+        for block in patches.lists.of(slot) {
             let mut moved = *block;
             moved.members &= self.moved[block.leaf as usize];
-            for slot in moved.slots() {
-                let old_d = (self.before[slot] - origin) * sums.per_m;
-                let new_d = (self.now[slot] - origin) * sums.per_m;
-                in_range &= new_d.abs().max_element() <= RANGE;
-                add(sums, old_d, -self.quanta);
-                add(sums, new_d, self.quanta);
+            for member in moved.slots() {
+                let old_d = (self.before[member] - origin) * sums.per_m;
+                let new_d = (self.now[member] - origin) * sums.per_m;
+                if new_d.abs().max_element() > RANGE {
+                    return None;
+                }
+                sums.add(Moments::of(old_d), -self.quanta);
+                sums.add(Moments::of(new_d), self.quanta);
             }
         }
-        in_range
+        Some(sums)
     }
 
     /// Sums all members about where the patch's point is now, in the smallest unit that will do.
-    fn sum_anew(&self, slot: usize, patches: &Patches, sums: &mut PatchSums) {
+    fn sum_anew(&self, slot: usize, patches: &Patches) -> PatchSums {
         let origin = self.now[slot];
-        sums.origin = origin.to_array();
-        sums.per_m = self.rest_per_m;
-        for _ in 0..DOUBLINGS_MAX {
-            (sums.sum, sums.squares, sums.products) = ([0; 3], [0; 3], [0; 3]);
-            let mut in_range = true;
-            for block in patches.lists.of(slot) {
-                for member in block.slots() {
-                    let d = (self.now[member] - origin) * sums.per_m;
-                    in_range &= d.abs().max_element() <= RANGE;
-                    add(sums, d, self.quanta);
-                }
-            }
-            if in_range {
-                break;
-            }
-            sums.per_m *= 0.5;
+        let mut total = Moments::of(Vec3::ZERO);
+        for member in patches
+            .lists
+            .of(slot)
+            .iter()
+            .flat_map(|block| block.slots())
+        {
+            let d = self.now[member] - origin;
+            let moments = Moments::of(d);
+            total.sum += moments.sum;
+            total.squares += moments.squares;
+            total.products += moments.products;
         }
+        // No member is farther than the root of the sum of squares.
+        let reach = total.squares.max_element().sqrt();
+        let mut per_m = self.rest_per_m;
+        for _ in 0..DOUBLINGS_MAX {
+            if reach * per_m > RANGE {
+                per_m *= 0.5;
+            }
+        }
+        let mut sums = PatchSums {
+            origin: origin.to_array(),
+            per_m,
+            ..PatchSums::zeroed()
+        };
+        let scaled = Moments {
+            sum: total.sum * per_m,
+            squares: total.squares * per_m * per_m,
+            products: total.products * per_m * per_m,
+        };
+        sums.add(scaled, self.quanta);
+        sums
     }
 
     fn fit(&mut self, slot: usize, patches: &Patches, normals: &[Vec3]) {
-        let sums = &self.patches[slot];
-        let point = sums.point as usize;
+        let sums = &self.sums[slot];
+        let point = patches.order[slot] as usize;
         let count = patches.member_count(slot);
         if count < 3 {
             self.planes[point] = Plane::tangent(normals[point]);
@@ -225,26 +227,47 @@ impl RunningPlanes {
     }
 }
 
-/// Adds the contribution of a member at `d`, in units, rounded to whole quanta; a negative number of
-/// quanta takes it out.
-fn add(sums: &mut PatchSums, d: Vec3, quanta: f32) {
-    let round = |v: Vec3| (v * quanta).to_array().map(|x| x.round_ties_even() as i32);
-    let products = Vec3::new(d.x * d.y, d.x * d.z, d.y * d.z);
-    for (sum, part) in [
-        (&mut sums.sum, round(d)),
-        (&mut sums.squares, round(d * d)),
-        (&mut sums.products, round(products)),
-    ] {
-        for axis in 0..3 {
-            sum[axis] = sum[axis].wrapping_add(part[axis]);
+/// What one member adds to the sums of its patch.
+struct Moments {
+    sum: Vec3,
+    squares: Vec3,
+    products: Vec3,
+}
+
+impl Moments {
+    fn of(d: Vec3) -> Self {
+        Self {
+            sum: d,
+            squares: d * d,
+            products: Vec3::new(d.x * d.y, d.x * d.z, d.y * d.z),
         }
     }
 }
 
-/// The largest power of two with `members` contributions of up to `RANGE²` below 2³⁰ quanta.
+impl PatchSums {
+    /// Adds `moments`, rounded to whole quanta; a negative number of quanta takes them out.
+    fn add(&mut self, moments: Moments, quanta: f32) {
+        for (sum, part) in [
+            (&mut self.sum, moments.sum),
+            (&mut self.squares, moments.squares),
+            (&mut self.products, moments.products),
+        ] {
+            let rounded = (part * quanta)
+                .to_array()
+                .map(|x| x.round_ties_even() as i32);
+            for axis in 0..3 {
+                sum[axis] = sum[axis].wrapping_add(rounded[axis]);
+            }
+        }
+    }
+}
+
+/// The largest power of two with `members` contributions of up to `RANGE²` below 2³⁰ quanta, and a
+/// single one up to 2²², so that a kernel can round it by an addition.
 fn quanta_for(members: u32) -> f32 {
-    let bits = 30 - (RANGE * RANGE).log2() as i32 - members.next_power_of_two().ilog2() as i32;
-    2.0_f32.powi(bits)
+    let range_bits = (RANGE * RANGE).log2() as i32;
+    let member_bits = members.next_power_of_two().ilog2() as i32;
+    2.0_f32.powi((30 - range_bits - member_bits).min(22 - range_bits))
 }
 
 /// The largest distance of a member from its patch's point at rest [m]; 1 if there is none.

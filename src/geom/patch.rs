@@ -11,6 +11,10 @@ use rstar::primitives::GeomWithData;
 
 /// Slots of a leaf: the bits of a mask.
 pub const LEAF_SLOTS: usize = 32;
+/// Slots that share one list of [`Patches::patches_of_runs`]; the same in `plane_moved.wgsl`.
+pub const RUN_SLOTS: usize = 8;
+/// Runs of a leaf.
+const RUNS_PER_LEAF: usize = LEAF_SLOTS / RUN_SLOTS;
 /// Points every patch has, if the surface has them: below about 7 a plane follows single points.
 pub const MEMBERS_MIN: usize = 16;
 
@@ -126,21 +130,21 @@ impl Patches {
         self.order.len().div_ceil(LEAF_SLOTS)
     }
 
-    /// The patches that any point of a leaf is in, leaf by leaf.
-    pub fn patches_of_leaves(&self) -> BlockLists {
-        let leaves: Vec<Vec<Block>> = (0..self.leaf_count())
-            .map(|leaf| {
-                let mut union = vec![0_u32; self.leaf_count()];
-                let first = leaf * LEAF_SLOTS;
-                for slot in first..(first + LEAF_SLOTS).min(self.order.len()) {
-                    for block in self.lists.of(slot) {
-                        union[block.leaf as usize] |= block.members;
-                    }
+    /// The patches that any point of a run of 8 slots is in, run by run: four to a leaf.
+    pub fn patches_of_runs(&self) -> BlockLists {
+        let runs: Vec<Vec<Block>> = (0..RUNS_PER_LEAF * self.leaf_count())
+            .into_par_iter()
+            .map(|run| {
+                let first = run * RUN_SLOTS;
+                let end = (first + RUN_SLOTS).min(self.order.len());
+                let mut union: Vec<Block> = Vec::new();
+                for block in (first..end).flat_map(|slot| self.lists.of(slot)) {
+                    add_members(&mut union, *block);
                 }
-                blocks_of_masks(&union)
+                union
             })
             .collect();
-        BlockLists::join(&leaves)
+        BlockLists::join(&runs)
     }
 }
 
@@ -162,11 +166,11 @@ impl Site {
     }
 }
 
-/// Points sorted so that each run of 32 is compact: halved along the longest side of their box
-/// until 32 are left.
+/// Points sorted so that each run of 32, and within it of 16, 8 and 4, is compact: halved along the
+/// longest side of their box until 4 are left.
 fn spatial_order(points: &[Vec3]) -> Vec<u32> {
     fn halve(points: &[Vec3], order: &mut [u32]) {
-        if order.len() <= LEAF_SLOTS {
+        if order.len() <= 4 {
             order.sort_unstable();
             return;
         }
@@ -174,7 +178,11 @@ fn spatial_order(points: &[Vec3]) -> Vec<u32> {
         let low = places().fold(Vec3::INFINITY, Vec3::min);
         let high = places().fold(Vec3::NEG_INFINITY, Vec3::max);
         let axis = (high - low).max_position();
-        let half = (order.len() / 2).next_multiple_of(LEAF_SLOTS);
+        let half = if order.len() > LEAF_SLOTS {
+            (order.len() / 2).next_multiple_of(LEAF_SLOTS)
+        } else {
+            (order.len() / 2).next_power_of_two()
+        };
         order.select_nth_unstable_by(half, |&a, &b| {
             points[a as usize][axis]
                 .total_cmp(&points[b as usize][axis])
@@ -276,18 +284,16 @@ fn fill_small_patches(sorted: &[Site], lists: &mut [Vec<Block>]) {
 }
 
 fn add_member(list: &mut Vec<Block>, slot: usize) {
-    let leaf = (slot / LEAF_SLOTS) as u32;
-    let bit = 1 << (slot % LEAF_SLOTS);
-    match list.binary_search_by_key(&leaf, |block| block.leaf) {
-        Ok(at) => list[at].members |= bit,
-        Err(at) => list.insert(at, Block { leaf, members: bit }),
-    }
+    let block = Block {
+        leaf: (slot / LEAF_SLOTS) as u32,
+        members: 1 << (slot % LEAF_SLOTS),
+    };
+    add_members(list, block);
 }
 
-fn blocks_of_masks(masks: &[u32]) -> Vec<Block> {
-    (0_u32..)
-        .zip(masks)
-        .filter(|&(_, &members)| members != 0)
-        .map(|(leaf, &members)| Block { leaf, members })
-        .collect()
+fn add_members(list: &mut Vec<Block>, block: Block) {
+    match list.binary_search_by_key(&block.leaf, |known| known.leaf) {
+        Ok(at) => list[at].members |= block.members,
+        Err(at) => list.insert(at, block),
+    }
 }

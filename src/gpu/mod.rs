@@ -60,6 +60,11 @@ impl Gpu {
     pub fn instance(display: Option<Box<dyn wgpu::wgt::WgpuHasDisplayHandle>>) -> wgpu::Instance {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
         descriptor.display = display;
+        // Indirect dispatches are sized by our own kernels, within what `workgroups` allowed when the
+        // pass was made; checking them again is one more dispatch each.
+        descriptor
+            .flags
+            .remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
         wgpu::Instance::new(descriptor)
     }
 

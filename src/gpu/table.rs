@@ -16,7 +16,9 @@ pub enum Entry {
     /// kernel may write it, as [`Binding::Image`](super::Binding::Image).
     Floats,
     /// `vec2u`: `texture_2d<u32>`, bound as [`Binding::Integers`](super::Binding::Integers).
-    Integers,
+    Pairs,
+    /// `u32`: as pairs; a kernel may write it.
+    Words,
 }
 
 impl Entry {
@@ -24,14 +26,16 @@ impl Entry {
     pub fn format(self) -> wgpu::TextureFormat {
         match self {
             Self::Floats => wgpu::TextureFormat::Rgba32Float,
-            Self::Integers => wgpu::TextureFormat::Rg32Uint,
+            Self::Pairs => wgpu::TextureFormat::Rg32Uint,
+            Self::Words => wgpu::TextureFormat::R32Uint,
         }
     }
 
     fn bytes(self) -> usize {
         match self {
             Self::Floats => 16,
-            Self::Integers => 8,
+            Self::Pairs => 8,
+            Self::Words => 4,
         }
     }
 }

@@ -80,7 +80,7 @@ impl PlaneFull {
         );
         let empty = vec![[0.0_f32; 4]; slot_count];
         let slots = Table::new(gpu, "positions by slot", Entry::Floats, &empty)?;
-        let blocks = Table::new(gpu, "patch members", Entry::Integers, &patches.lists.blocks)?;
+        let blocks = Table::new(gpu, "patch members", Entry::Pairs, &patches.lists.blocks)?;
         let planes = storage(gpu, "planes", &empty)?;
         let order = storage(gpu, "slot order", &patches.order)?;
         let sort_kernel = Kernel::new(

@@ -13,7 +13,10 @@ use crate::gpu::{
 use crate::wgsl;
 use glam::Vec3;
 
-const WORKGROUP_SIZE: u32 = 64;
+/// Of the update, a thread a patch; the same in `plane_moved.wgsl`, which counts workgroups.
+const PATCH_WORKGROUP_SIZE: u32 = 64;
+/// Of the other two, a thread a leaf: small, since there are few leaves to share out.
+const LEAF_WORKGROUP_SIZE: u32 = 8;
 
 /// Mirror of `Params` in `shaders/plane_moved.wgsl` and `shaders/plane_commit.wgsl`.
 #[repr(C)]
@@ -29,10 +32,10 @@ pub struct MovedParams {
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct UpdateParams {
-    pub slot_count: u32,
     pub quanta: f32,
     pub rest_per_m: f32,
     pub pad0: u32,
+    pub pad1: u32,
 }
 
 /// The pass that keeps planes up to date.
@@ -41,9 +44,10 @@ pub struct PlaneIncremental {
     update_kernel: Kernel,
     commit_kernel: Kernel,
     leaf_workgroups: u32,
-    slot_workgroups: u32,
-    /// Counts of the frame, then a mark for each slot.
+    /// Points moved, planes fitted and patches listed in the frame, then a mark for each slot.
     frame: wgpu::Buffer,
+    /// How large the update is to be, as the first kernel found.
+    update_workgroups: wgpu::Buffer,
     /// Sums of every patch, `[PatchSums; slots]`.
     pub sums: wgpu::Buffer,
     /// Unit normal and signed offset [m], `[vec4f; points]`.
@@ -114,13 +118,21 @@ impl PlaneIncremental {
             .collect();
         let now = Table::new(gpu, "places by slot", Entry::Floats, &places)?;
         let committed = Table::new(gpu, "committed places", Entry::Floats, &places)?;
-        let blocks = Table::new(gpu, "patch members", Entry::Integers, &patches.lists.blocks)?;
-        let moved = storage(gpu, "moved slots", &rest.moved)?;
-        let frame = storage(gpu, "marked patches", &vec![0_u32; 2 + leaf_count])?;
-        let sums = storage(gpu, "patch sums", &rest.patches)?;
+        let blocks = Table::new(gpu, "patch members", Entry::Pairs, &patches.lists.blocks)?;
+        let moved = Table::new(gpu, "moved slots", Entry::Words, &rest.moved)?;
+        let frame = storage(gpu, "marked patches", &vec![0_u32; 3 + leaf_count])?;
+        let listed = storage(gpu, "listed patches", &vec![0_u32; slot_count])?;
+        let update_workgroups = storage(gpu, "patch workgroups", &[0_u32, 1, 1])?;
+        // The update is sent to at most this many: refused here, not in a frame.
+        workgroups(gpu, Self::NAME, slot_count, PATCH_WORKGROUP_SIZE)?;
+        let sums = storage(gpu, "patch sums", &rest.sums)?;
+        let starts = patches.lists.start.windows(2);
+        let ranges: Vec<[u32; 2]> = starts.map(|pair| [pair[0], pair[1]]).collect();
+        let ranges = Table::new(gpu, "patch blocks", Entry::Pairs, &ranges)?;
         let planes: Vec<[f32; 4]> = rest.planes.iter().map(|plane| plane.to_array()).collect();
         let planes = storage(gpu, "planes", &planes)?;
-        let of_leaves = patches.patches_of_leaves();
+        let of_runs = patches.patches_of_runs();
+        let run_blocks = Table::new(gpu, "patches of runs", Entry::Pairs, &of_runs.blocks)?;
         let moved_params = uniform(
             gpu,
             Self::NAME,
@@ -141,11 +153,13 @@ impl PlaneIncremental {
                 Binding::Uniform(&moved_params),
                 Binding::Unfiltered(&buffers.position_table.view),
                 Binding::Unfiltered(&committed.view),
-                Binding::Read(&storage(gpu, "patches of leaves", &of_leaves.start)?),
-                Binding::Read(&storage(gpu, "patches of leaves", &of_leaves.blocks)?),
+                Binding::Read(&storage(gpu, "patches of runs", &of_runs.start)?),
+                Binding::Integers(&run_blocks.view),
                 Binding::Image(&now.view, Entry::Floats.format()),
-                Binding::Write(&moved),
+                Binding::Image(&moved.view, Entry::Words.format()),
                 Binding::Write(&frame),
+                Binding::Write(&listed),
+                Binding::Write(&update_workgroups),
             ],
         )?;
         let update_kernel = Kernel::new(
@@ -159,16 +173,18 @@ impl PlaneIncremental {
                     gpu,
                     Self::NAME,
                     &UpdateParams {
-                        slot_count: slot_count as u32,
                         quanta: rest.quanta,
                         rest_per_m: rest.rest_per_m,
                         pad0: 0,
+                        pad1: 0,
                     },
                 )),
                 Binding::Unfiltered(&committed.view),
                 Binding::Unfiltered(&now.view),
-                Binding::Read(&moved),
+                Binding::Integers(&moved.view),
+                Binding::Integers(&ranges.view),
                 Binding::Integers(&blocks.view),
+                Binding::Read(&listed),
                 Binding::Read(&tangents.normals),
                 Binding::Write(&sums),
                 Binding::Write(&frame),
@@ -183,7 +199,7 @@ impl PlaneIncremental {
             "main",
             &[
                 Binding::Uniform(&moved_params),
-                Binding::Read(&moved),
+                Binding::Integers(&moved.view),
                 Binding::Unfiltered(&now.view),
                 Binding::Image(&committed.view, Entry::Floats.format()),
             ],
@@ -196,10 +212,10 @@ impl PlaneIncremental {
                 gpu,
                 Self::NAME,
                 slot_count.div_ceil(LEAF_SLOTS),
-                WORKGROUP_SIZE,
+                LEAF_WORKGROUP_SIZE,
             )?,
-            slot_workgroups: workgroups(gpu, Self::NAME, slot_count, WORKGROUP_SIZE)?,
             frame,
+            update_workgroups,
             sums,
             planes,
         })
@@ -208,12 +224,14 @@ impl PlaneIncremental {
     /// Adds the dispatches to `encoder`.
     pub fn record(&self, encoder: &mut wgpu::CommandEncoder, timer: &mut Timer) {
         encoder.clear_buffer(&self.frame, 0, None);
+        encoder.clear_buffer(&self.update_workgroups, 0, Some(4));
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some(Self::NAME),
             timestamp_writes: timer.compute(Self::NAME),
         });
         self.moved_kernel.dispatch(&mut pass, self.leaf_workgroups);
-        self.update_kernel.dispatch(&mut pass, self.slot_workgroups);
+        self.update_kernel
+            .dispatch_indirect(&mut pass, &self.update_workgroups, 0);
         self.commit_kernel.dispatch(&mut pass, self.leaf_workgroups);
     }
 

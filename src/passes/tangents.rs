@@ -87,7 +87,7 @@ impl Tangents {
         let tangents = storage(gpu, "tangents", &vertices)?;
         let uv_gradients = storage(gpu, "UV gradients", &[vertices.clone(), vertices].concat())?;
 
-        let corners = |label, list: &[[u32; 2]]| Table::new(gpu, label, Entry::Integers, list);
+        let corners = |label, list: &[[u32; 2]]| Table::new(gpu, label, Entry::Pairs, list);
         let point_corners = corners("point fans", &fans.point_corners)?;
         let vertex_corners = corners("vertex fans", &fans.vertex_corners)?;
         let uv_inverse = Table::new(gpu, "inverse UV edges", Entry::Floats, &fans.uv_inverse)?;
