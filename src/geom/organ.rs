@@ -8,7 +8,7 @@
 
 mod bundle;
 mod dual;
-pub mod field;
+mod field;
 mod heart;
 mod kidney;
 mod liver;
