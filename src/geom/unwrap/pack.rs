@@ -104,7 +104,8 @@ pub fn pack(flats: &mut [Flat]) {
     }
 }
 
-/// Edges of a chart that only one of its triangles has.
+/// Edges of a chart that only one of its triangles has; all edges of a chart of few triangles,
+/// since one without area may have no such edge.
 fn border(flat: &Flat) -> Vec<[u32; 2]> {
     let mut edges: Vec<[u32; 2]> = flat
         .corners
@@ -115,7 +116,7 @@ fn border(flat: &Flat) -> Vec<[u32; 2]> {
     edges.sort_unstable();
     edges
         .chunk_by(|x, y| x == y)
-        .filter(|same| same.len() == 1)
+        .filter(|same| same.len() == 1 || flat.corners.len() <= 8)
         .map(|same| same[0])
         .collect()
 }
