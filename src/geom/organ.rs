@@ -8,12 +8,14 @@
 
 mod bundle;
 mod dual;
-pub mod field;
+mod field;
 mod heart;
+mod kidney;
 mod liver;
+mod spleen;
 mod surface;
 
-pub use bundle::{BundledFile, MAP_SIZE_PX, bundled_files};
+pub use bundle::{BundledFile, bundled_files};
 
 use super::SurfaceMesh;
 use super::unwrap::unwrap;
@@ -24,6 +26,8 @@ use glam::Vec3;
 pub enum Organ {
     Liver,
     Heart,
+    Kidney,
+    Spleen,
 }
 
 /// What lies at a place of a bundled organ beside its tissue, each from 0 (absent) to 1.
@@ -47,13 +51,24 @@ pub struct Features {
 
 impl Organ {
     /// Every organ.
-    pub const ALL: [Self; 2] = [Self::Liver, Self::Heart];
+    pub const ALL: [Self; 4] = [Self::Liver, Self::Heart, Self::Kidney, Self::Spleen];
 
     /// Name in file names.
     pub fn name(self) -> &'static str {
         match self {
             Self::Liver => "liver",
             Self::Heart => "heart",
+            Self::Kidney => "kidney",
+            Self::Spleen => "spleen",
+        }
+    }
+
+    /// Side of the bundled maps [px]: a texel is about a third of a millimetre on each organ but
+    /// the heart, whose fibres want finer ones.
+    pub fn map_size_px(self) -> u32 {
+        match self {
+            Self::Liver | Self::Heart => 1024,
+            Self::Kidney | Self::Spleen => 512,
         }
     }
 
@@ -68,6 +83,8 @@ impl Organ {
         let shape = match self {
             Self::Liver => liver::SHAPE,
             Self::Heart => heart::SHAPE,
+            Self::Kidney => kidney::SHAPE,
+            Self::Spleen => spleen::SHAPE,
         };
         surface::surface(&shape)
     }
@@ -78,6 +95,8 @@ impl Organ {
         match self {
             Self::Liver => liver::features(p),
             Self::Heart => heart::features(p),
+            Self::Kidney => kidney::features(p),
+            Self::Spleen => spleen::features(p),
         }
     }
 
@@ -86,6 +105,8 @@ impl Organ {
         let paths = match self {
             Self::Liver => liver::VESSELS,
             Self::Heart => heart::VESSELS,
+            Self::Kidney => kidney::VESSELS,
+            Self::Spleen => spleen::VESSELS,
         };
         paths
             .iter()
@@ -184,6 +205,8 @@ mod tests {
             let (extents, volumes) = match organ {
                 Organ::Liver => (0.20..0.24, 0.9..1.8),
                 Organ::Heart => (0.11..0.14, 0.2..0.4),
+                Organ::Kidney => (0.10..0.13, 0.1..0.2),
+                Organ::Spleen => (0.10..0.13, 0.1..0.25),
             };
             assert!(extents.contains(&extent), "{} {extent} m", organ.name());
             assert!(volumes.contains(&litres), "{} {litres} L", organ.name());

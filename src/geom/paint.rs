@@ -25,17 +25,21 @@ pub enum Tissue {
     #[default]
     Liver,
     Heart,
+    Kidney,
+    Spleen,
 }
 
 impl Tissue {
     /// Every tissue.
-    pub const ALL: [Self; 2] = [Self::Liver, Self::Heart];
+    pub const ALL: [Self; 4] = [Self::Liver, Self::Heart, Self::Kidney, Self::Spleen];
 
     /// Name in scene files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Liver => "liver",
             Self::Heart => "heart",
+            Self::Kidney => "kidney",
+            Self::Spleen => "spleen",
         }
     }
 
@@ -43,7 +47,7 @@ impl Tissue {
     fn extent_cm(self) -> f32 {
         match self {
             Self::Liver => 22.0,
-            Self::Heart => 12.5,
+            Self::Heart | Self::Kidney | Self::Spleen => 12.0,
         }
     }
 }
@@ -88,6 +92,8 @@ pub fn paint_organ(mesh: &SurfaceMesh, organ: Organ, size_px: u32) -> TissueMaps
     let tissue = match organ {
         Organ::Liver => Tissue::Liver,
         Organ::Heart => Tissue::Heart,
+        Organ::Kidney => Tissue::Kidney,
+        Organ::Spleen => Tissue::Spleen,
     };
     paint_with(mesh, tissue, size_px, Some(organ))
 }

@@ -7,9 +7,6 @@ use crate::geom::tangent::{Fans, rest_normals};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{DynamicImage, ExtendedColorType, ImageEncoder, RgbaImage};
 
-/// Side of the bundled maps [px].
-pub const MAP_SIZE_PX: u32 = 1024;
-
 /// One file of an organ.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BundledFile {
@@ -33,7 +30,7 @@ pub fn bundled_files(organ: Organ) -> Vec<BundledFile> {
         path: format!("organs/{name}.glb"),
         bytes: glb_bytes(&mesh, &normals, &material),
     }];
-    let maps = paint_organ(&mesh, organ, MAP_SIZE_PX);
+    let maps = paint_organ(&mesh, organ, organ.map_size_px());
     files.extend(png_files(&maps).map(|(map, bytes)| BundledFile {
         path: format!("textures/{name}-{map}.png"),
         bytes,

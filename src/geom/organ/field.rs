@@ -64,6 +64,12 @@ pub fn polyline(p: Vec3, path: &[[f32; 3]]) -> f32 {
         .fold(f32::MAX, f32::min)
 }
 
+/// End of a path and the direction in which it ends.
+pub fn cut(path: &[[f32; 3]]) -> (Vec3, Vec3) {
+    let end = Vec3::from(path[path.len() - 1]);
+    (end, (end - Vec3::from(path[path.len() - 2])).normalize())
+}
+
 /// Union of two solids, blended over `width`.
 pub fn join(a: f32, b: f32, width: f32) -> f32 {
     let h = (width - (a - b).abs()).max(0.0) / width;

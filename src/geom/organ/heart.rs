@@ -3,7 +3,7 @@
 
 use super::Features;
 use super::field::{
-    Shape, along, carve, ellipsoid, ellipsoid_along, hump, inside, join, meet, polyline, tube,
+    Shape, along, carve, cut, ellipsoid, ellipsoid_along, hump, inside, join, meet, polyline, tube,
 };
 use crate::geom::noise::{gradient, smoothstep};
 use glam::Vec3;
@@ -193,12 +193,6 @@ fn lumen(p: Vec3, path: &[[f32; 3]], radius: f32) -> f32 {
     let (end, way) = cut(path);
     let (distance, _) = along(p, end - LUMEN_DEPTH * way, end + way);
     distance - (radius - WALL)
-}
-
-/// End of a vessel and the direction in which it ends.
-fn cut(path: &[[f32; 3]]) -> (Vec3, Vec3) {
-    let end = Vec3::from(path[path.len() - 1]);
-    (end, (end - Vec3::from(path[path.len() - 2])).normalize())
 }
 
 pub fn features(p: Vec3) -> Features {

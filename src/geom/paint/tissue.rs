@@ -5,7 +5,9 @@
 //! mixed as they are, in sRGB: powers need not have the same bits everywhere.
 
 mod heart;
+mod kidney;
 mod liver;
+mod spleen;
 
 use super::canvas::Canvas;
 use super::vessel::{Samples, Tree};
@@ -33,6 +35,8 @@ impl Brush {
         let (large, fine) = match tissue {
             Tissue::Liver => (liver::LARGE, liver::FINE),
             Tissue::Heart => (heart::LARGE, heart::FINE),
+            Tissue::Kidney => (kidney::LARGE, kidney::FINE),
+            Tissue::Spleen => (spleen::LARGE, spleen::FINE),
         };
         let roots;
         let guides = if guides.is_empty() {
@@ -56,6 +60,8 @@ impl Brush {
         let mut dab = match self.tissue {
             Tissue::Liver => liver::dab(site, large, fine),
             Tissue::Heart => heart::dab(site, large, fine),
+            Tissue::Kidney => kidney::dab(site, large, fine),
+            Tissue::Spleen => spleen::dab(site, large, fine),
         };
         // Rounding must keep the layers in order.
         for k in 1..4 {
@@ -65,12 +71,14 @@ impl Brush {
     }
 }
 
-/// Where vessels begin on a surface of unknown shape: in the middle of its back for the liver,
-/// near the top for the heart.
+/// Where vessels begin on a surface of unknown shape: at the back for the liver, near the top for
+/// the heart.
 fn own_roots(tissue: Tissue, samples: &Samples) -> Vec<Vec<Vec3>> {
     let score = |sample: usize| match tissue {
         Tissue::Liver => -samples.normals[sample].y - samples.normals[sample].z,
         Tissue::Heart => samples.places[sample].y + 0.5 * samples.normals[sample].z,
+        // Towards the middle of the body, where the hilum is.
+        Tissue::Kidney | Tissue::Spleen => -samples.normals[sample].x,
     };
     (0..samples.places.len())
         .max_by(|&a, &b| score(a).total_cmp(&score(b)))
@@ -109,4 +117,62 @@ fn fat(place: Vec3) -> (Vec3, f32) {
     let colour = rgb(168, 112, 70).lerp(rgb(204, 166, 116), shade.clamp(0.0, 1.0));
     let colour = rgb(150, 84, 58).lerp(colour, lerp(0.72, 1.0, seam));
     (colour, 0.022 * round.max(0.0) + 0.008 * seam)
+}
+
+/// Walls of large arteries and veins, and where they are cut open.
+fn great_vessels(site: &Site, dab: &mut Dab) {
+    let p = site.place;
+    let features = site.features;
+    if features.artery.max(features.vein).max(features.lumen) <= 0.0 {
+        return;
+    }
+    let grain = fractal(p / 0.4, 3, 8);
+    let walls = [
+        (
+            features.artery,
+            rgb(166, 112, 96),
+            rgb(194, 150, 130),
+            rgb(150, 70, 56),
+        ),
+        (
+            features.vein,
+            rgb(122, 82, 86),
+            rgb(162, 122, 118),
+            rgb(96, 40, 48),
+        ),
+    ];
+    for (amount, dark, light, deep) in walls {
+        dab.outer = dab.outer.lerp(dark.lerp(light, 0.5 + 0.5 * grain), amount);
+        dab.inner = dab.inner.lerp(deep, amount);
+        dab.opacity = lerp(dab.opacity, 0.85, amount);
+        dab.relief = lerp(dab.relief, 0.003 * grain, amount);
+    }
+    dab.outer = dab.outer.lerp(rgb(62, 8, 12), features.lumen);
+    dab.inner = dab.inner.lerp(rgb(50, 6, 10), features.lumen);
+    dab.opacity = lerp(dab.opacity, 0.9, features.lumen);
+}
+
+/// Fat in the hilum, the ureter and the vessels of an organ that hangs from them.
+fn surroundings(site: &Site, dab: &mut Dab) {
+    let p = site.place;
+    let features = site.features;
+    let amount = if features.fat > 0.1 {
+        smoothstep(0.3, 0.75, features.fat + 0.4 * fractal(p / 0.5, 3, 11))
+    } else {
+        0.0
+    };
+    if amount > 0.0 {
+        let (colour, relief) = fat(p);
+        dab.outer = dab.outer.lerp(colour, amount);
+        dab.inner = dab.inner.lerp(rgb(150, 92, 48), amount);
+        dab.opacity = lerp(dab.opacity, 0.95, amount);
+        dab.relief += amount * relief;
+    }
+    if features.ligament > 0.0 {
+        let pale = rgb(158, 116, 98).lerp(rgb(190, 152, 126), 0.5 + 0.5 * fractal(p / 0.3, 3, 12));
+        dab.outer = dab.outer.lerp(pale, features.ligament);
+        dab.inner = dab.inner.lerp(rgb(140, 84, 66), features.ligament);
+        dab.opacity = lerp(dab.opacity, 0.9, features.ligament);
+    }
+    great_vessels(site, dab);
 }

@@ -285,13 +285,13 @@ impl<'a> Growth<'a> {
             }
         }
         let first = self.nodes.len();
-        for node in 0..first {
-            if pulls[node] == Vec3::ZERO {
+        for (node, pull) in pulls.into_iter().enumerate() {
+            if pull == Vec3::ZERO {
                 continue;
             }
             let here = self.nodes[node];
             let onward = (here - self.nodes[self.parents[node] as usize]).normalize_or_zero();
-            let way = (pulls[node].normalize_or_zero() + 0.5 * onward).normalize_or_zero();
+            let way = (pull.normalize_or_zero() + 0.5 * onward).normalize_or_zero();
             let next = self.wandering(here + way * self.habit.step);
             let crowded = self.nodes[first..]
                 .iter()

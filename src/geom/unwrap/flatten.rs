@@ -340,10 +340,10 @@ impl<'a> Shapes<'a> {
             pull.fill(DVec2::ZERO);
             for ((c, shape), w) in self.corners.iter().zip(&self.flat).zip(&self.weights) {
                 let (cosine, sine) = rotation(c.map(|p| places[p as usize]), shape, w);
-                for k in 0..3 {
+                for (k, &weight) in w.iter().enumerate() {
                     let (i, j) = ((k + 1) % 3, (k + 2) % 3);
                     let edge = shape[i] - shape[j];
-                    let turned = w[k]
+                    let turned = weight
                         * DVec2::new(
                             cosine * edge.x - sine * edge.y,
                             sine * edge.x + cosine * edge.y,
@@ -360,11 +360,11 @@ impl<'a> Shapes<'a> {
 /// Cosine and sine of the rotation that carries a rest shape best to its places.
 fn rotation(places: [DVec2; 3], shape: &[DVec2; 3], weights: &[f64; 3]) -> (f64, f64) {
     let (mut along, mut across) = (0.0, 0.0);
-    for k in 0..3 {
+    for (k, &weight) in weights.iter().enumerate() {
         let (i, j) = ((k + 1) % 3, (k + 2) % 3);
         let (from, to) = (shape[i] - shape[j], places[i] - places[j]);
-        along += weights[k] * from.dot(to);
-        across += weights[k] * from.perp_dot(to);
+        along += weight * from.dot(to);
+        across += weight * from.perp_dot(to);
     }
     let length = (along * along + across * across).sqrt();
     if length > 0.0 {

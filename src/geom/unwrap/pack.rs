@@ -15,6 +15,8 @@ use glam::DVec2;
 const COLUMNS: usize = 512;
 /// Quarters of this many directions are tried for the smallest box around a chart.
 const DIRECTIONS: usize = 16;
+/// Up to so many charts are tried in diagonal positions too; more fill the gaps anyway.
+const FEW_CHARTS: usize = 24;
 /// Halvings of the range of scales: the scale is found to 1/1000.
 const HALVINGS: usize = 10;
 
@@ -39,7 +41,11 @@ pub fn pack(flats: &mut [Flat]) {
     if flats.is_empty() {
         return;
     }
-    let turned: Vec<Vec<Turned>> = flats.iter().map(orientations).collect();
+    let turned: Vec<Vec<Turned>> = flats
+        .iter()
+        .map(|flat| orientations(flat, flats.len() <= FEW_CHARTS))
+        .collect();
+    let borders: Vec<Vec<[u32; 2]>> = flats.iter().map(border).collect();
     let longest = turned
         .iter()
         .flatten()
@@ -63,7 +69,7 @@ pub fn pack(flats: &mut [Flat]) {
     let mut best = None;
     let mut scale = 0.75 * too_large;
     for _ in 0..HALVINGS {
-        match try_scale(flats, &turned, &order, scale) {
+        match try_scale(flats, &borders, &turned, &order, scale) {
             Some(placed) => {
                 fits = scale;
                 best = Some((scale, placed));
@@ -87,7 +93,7 @@ pub fn pack(flats: &mut [Flat]) {
                 ],
             ))
         } else {
-            try_scale(flats, &turned, &order, scale).map(|placed| (scale, placed))
+            try_scale(flats, &borders, &turned, &order, scale).map(|placed| (scale, placed))
         };
     }
     let (scale, placed) = best.expect("the loop above ends with a result");
@@ -98,12 +104,30 @@ pub fn pack(flats: &mut [Flat]) {
     }
 }
 
+/// Edges of a chart that only one of its triangles has; all edges of a chart of few triangles,
+/// since one without area may have no such edge.
+fn border(flat: &Flat) -> Vec<[u32; 2]> {
+    let mut edges: Vec<[u32; 2]> = flat
+        .corners
+        .iter()
+        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+        .map(|[a, b]| [a.min(b), a.max(b)])
+        .collect();
+    edges.sort_unstable();
+    edges
+        .chunk_by(|x, y| x == y)
+        .filter(|same| same.len() == 1 || flat.corners.len() <= 8)
+        .map(|same| same[0])
+        .collect()
+}
+
 fn rotate(p: DVec2, axis: DVec2) -> DVec2 {
     DVec2::new(axis.x * p.x - axis.y * p.y, axis.y * p.x + axis.x * p.y)
 }
 
-/// The four upright positions of the smallest box around a chart, upright the long way first.
-fn orientations(flat: &Flat) -> Vec<Turned> {
+/// The four upright positions of the smallest box around a chart, and the four diagonal ones if
+/// wanted, those that stand first.
+fn orientations(flat: &Flat, diagonal: bool) -> Vec<Turned> {
     let at = |axis: DVec2| {
         let first = rotate(flat.places[0], axis);
         let (low, high) = flat
@@ -128,6 +152,9 @@ fn orientations(flat: &Flat) -> Vec<Turned> {
     let mut all = Vec::new();
     for _ in 0..4 {
         all.push(at(axis));
+        if diagonal {
+            all.push(at(rotate(axis, DVec2::ONE / 2.0_f64.sqrt())));
+        }
         axis = DVec2::new(-axis.y, axis.x);
     }
     let wide = |t: &Turned| (t.high - t.low).x > (t.high - t.low).y;
@@ -138,6 +165,7 @@ fn orientations(flat: &Flat) -> Vec<Turned> {
 /// Packs at one scale; `None` if the pile grows out of the square.
 fn try_scale(
     flats: &[Flat],
+    borders: &[Vec<[u32; 2]>],
     turned: &[Vec<Turned>],
     order: &[usize],
     scale: f64,
@@ -155,7 +183,7 @@ fn try_scale(
     for &chart in order {
         let mut best: Option<(f64, usize, usize, f64, Outline)> = None;
         for (which, turned) in turned[chart].iter().enumerate() {
-            let outline = Outline::new(&flats[chart], turned, scale);
+            let outline = Outline::new(&flats[chart], &borders[chart], turned, scale);
             let width = outline.low.len();
             if width + 2 > COLUMNS {
                 continue;
@@ -208,7 +236,7 @@ struct Outline {
 }
 
 impl Outline {
-    fn new(flat: &Flat, turned: &Turned, scale: f64) -> Self {
+    fn new(flat: &Flat, border: &[[u32; 2]], turned: &Turned, scale: f64) -> Self {
         let pad = 0.5 * GUTTER_SHARE;
         let size = (turned.high - turned.low) * scale;
         let columns = COLUMNS as f64;
@@ -216,32 +244,29 @@ impl Outline {
         let mut low = vec![f64::MAX; width];
         let mut high = vec![f64::MIN; width];
         let place = |p: u32| (rotate(flat.places[p as usize], turned.axis) - turned.low) * scale;
-        for c in &flat.corners {
-            let p = c.map(place);
-            for k in 0..3 {
-                let (a, b) = (p[k], p[(k + 1) % 3]);
-                let (a, b) = if a.x <= b.x { (a, b) } else { (b, a) };
-                // Shifted by `pad`, the chart begins half a gutter inside its first column.
-                let first = (a.x * columns) as usize;
-                let last = (((b.x + 2.0 * pad) * columns) as usize).min(width - 1);
-                for column in first..=last {
-                    let edge = column as f64 / columns - pad;
-                    let (from, to) = (edge - pad, edge + 1.0 / columns + pad);
-                    let at = |x: f64| {
-                        let t = if b.x > a.x {
-                            (x - a.x) / (b.x - a.x)
-                        } else {
-                            0.0
-                        };
-                        a.y + (b.y - a.y) * t.clamp(0.0, 1.0)
+        for edge in border {
+            let [a, b] = edge.map(place);
+            let (a, b) = if a.x <= b.x { (a, b) } else { (b, a) };
+            // Shifted by `pad`, the chart begins half a gutter inside its first column.
+            let first = (a.x * columns) as usize;
+            let last = (((b.x + 2.0 * pad) * columns) as usize).min(width - 1);
+            for column in first..=last {
+                let edge = column as f64 / columns - pad;
+                let (from, to) = (edge - pad, edge + 1.0 / columns + pad);
+                let at = |x: f64| {
+                    let t = if b.x > a.x {
+                        (x - a.x) / (b.x - a.x)
+                    } else {
+                        0.0
                     };
-                    let (y0, y1) = (at(from), at(to));
-                    let whole = b.x <= a.x;
-                    let least = if whole { a.y.min(b.y) } else { y0.min(y1) };
-                    let most = if whole { a.y.max(b.y) } else { y0.max(y1) };
-                    low[column] = low[column].min(least - pad);
-                    high[column] = high[column].max(most + pad);
-                }
+                    a.y + (b.y - a.y) * t.clamp(0.0, 1.0)
+                };
+                let (y0, y1) = (at(from), at(to));
+                let whole = b.x <= a.x;
+                let least = if whole { a.y.min(b.y) } else { y0.min(y1) };
+                let most = if whole { a.y.max(b.y) } else { y0.max(y1) };
+                low[column] = low[column].min(least - pad);
+                high[column] = high[column].max(most + pad);
             }
         }
         for column in 0..width {

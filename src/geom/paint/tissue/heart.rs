@@ -1,6 +1,6 @@
 //! Heart: fibres that wind round the ventricles, coronary arteries in fat, fine veins.
 
-use super::{Dab, Site, fat, rgb};
+use super::{Dab, Site, fat, great_vessels, rgb};
 use crate::geom::noise::{fractal, gradient, lerp, smoothstep};
 use crate::geom::paint::vessel::{Cover, Habit};
 use glam::Vec3;
@@ -108,37 +108,4 @@ pub fn dab(site: &Site, large: Cover, fine: Cover) -> Dab {
     dab.depths[2] = lerp(dab.depths[2], 0.8, artery);
     great_vessels(site, &mut dab);
     dab
-}
-
-/// Aorta, pulmonary trunk, veins, and where they are cut open.
-fn great_vessels(site: &Site, dab: &mut Dab) {
-    let p = site.place;
-    let features = site.features;
-    if features.artery.max(features.vein).max(features.lumen) <= 0.0 {
-        return;
-    }
-    let grain = fractal(p / 0.4, 3, 8);
-    let walls = [
-        (
-            features.artery,
-            rgb(166, 112, 96),
-            rgb(194, 150, 130),
-            rgb(150, 70, 56),
-        ),
-        (
-            features.vein,
-            rgb(122, 82, 86),
-            rgb(162, 122, 118),
-            rgb(96, 40, 48),
-        ),
-    ];
-    for (amount, dark, light, deep) in walls {
-        dab.outer = dab.outer.lerp(dark.lerp(light, 0.5 + 0.5 * grain), amount);
-        dab.inner = dab.inner.lerp(deep, amount);
-        dab.opacity = lerp(dab.opacity, 0.85, amount);
-        dab.relief = lerp(dab.relief, 0.003 * grain, amount);
-    }
-    dab.outer = dab.outer.lerp(rgb(62, 8, 12), features.lumen);
-    dab.inner = dab.inner.lerp(rgb(50, 6, 10), features.lumen);
-    dab.opacity = lerp(dab.opacity, 0.9, features.lumen);
 }

@@ -51,8 +51,8 @@ pub fn dab(site: &Site, large: Cover, fine: Cover) -> Dab {
     let thread = fine.core;
 
     let tone = (0.5 + 0.45 * drift + 0.28 * blotch + 0.16 * (lobule.shade - 0.5)).clamp(0.0, 1.0);
-    let mut outer = rgb(86, 27, 22).lerp(rgb(138, 58, 42), tone);
-    outer = outer.lerp(rgb(158, 86, 62), 0.20 * rim);
+    let mut outer = rgb(80, 27, 23).lerp(rgb(130, 57, 43), tone);
+    outer = outer.lerp(rgb(150, 86, 66), 0.18 * rim);
     outer = outer.lerp(rgb(72, 24, 30), 0.22 * halo + 0.12 * vein);
     outer = outer.lerp(rgb(92, 14, 16), 0.45 * thread);
     // The capsule's veil: a bluish, greyish bloom in some places.
