@@ -11,7 +11,7 @@ use super::plane_incremental::PlaneIncremental;
 use super::shadow::Shadow;
 use super::surface::{NoShadow, Surface, SurfaceInputs, shadow_inputs};
 use super::tangents::Tangents;
-use super::tonemap::ToneMap;
+use super::tonemap::{PartPx, ToneMap};
 use super::tools::{DrawnTool, Tools, ToolsView};
 use super::view::{FrameUniform, View, placed_lights, shadow_from_world};
 use super::{DEPTH_FORMAT, PICTURE_FORMAT, RADIANCE_FORMAT};
@@ -21,7 +21,7 @@ use crate::geom::patch::radius_from_extinction_m;
 use crate::geom::plane::LightPathMethod;
 use crate::gpu::{Gpu, GpuError, Timer, uniform};
 use crate::scene::{PlacedLight, RestBox, Scene, SurfaceKind, SurfaceSection};
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec2, Vec3};
 
 /// Light that is left at the radius of a patch: ε of François 2006, section 2.2.
 const PATCH_EPSILON: f32 = 0.01;
@@ -307,9 +307,16 @@ impl FramePasses {
             encoder,
             timer,
         );
-        // Exposure, tone curve, sRGB, backdrop.
-        self.tone_map
-            .record(gpu, self.knobs.exposure, &self.picture, encoder, timer);
+        // Exposure, tone curve, sRGB; only where something was drawn.
+        let part = drawn_part(points, tools, view, self.size);
+        self.tone_map.record(
+            gpu,
+            self.knobs.exposure,
+            part,
+            &self.picture,
+            encoder,
+            timer,
+        );
     }
 
     /// What the last submitted frame fitted.
@@ -320,6 +327,38 @@ impl FramePasses {
     pub fn refit_counts(&self, gpu: &Gpu) -> Result<RefitCounts, GpuError> {
         self.light_path.counts(gpu)
     }
+}
+
+/// The part of the picture that surface and tools can cover, with a margin for the smoothed outline.
+fn drawn_part(points: &[Vec3], tools: &[DrawnTool], view: &View, size: [u32; 2]) -> PartPx {
+    let [width, height] = size.map(|px| px as f32);
+    let clip_from_world = view.clip_from_world(width / height);
+    let view_from_world = view.view_from_world();
+    let scale = height / (2.0 * (0.5 * view.fov_y).tan());
+    let ends = tools.iter().flat_map(|tool| {
+        [tool.tip_m, tool.tip_m + tool.axis_m].map(|end| (end, tool.radius_m))
+    });
+    let (mut low, mut high) = (Vec2::splat(f32::INFINITY), Vec2::splat(f32::NEG_INFINITY));
+    for (place, radius_m) in points.iter().map(|&p| (p, 0.0)).chain(ends) {
+        let distance_m = -view_from_world.transform_point3(place).z;
+        if distance_m <= 1.1 * radius_m {
+            // At or behind the eye a place has no pixel.
+            return [0, 0, size[0], size[1]];
+        }
+        let clip = clip_from_world.project_point3(place);
+        let at = Vec2::new(0.5 * (1.0 + clip.x) * width, 0.5 * (1.0 - clip.y) * height);
+        let reach = Vec2::splat(1.2 * radius_m * scale / (distance_m - radius_m) + 2.0);
+        low = low.min(at - reach);
+        high = high.max(at + reach);
+    }
+    let low = low.floor().clamp(Vec2::ZERO, Vec2::new(width, height));
+    let high = high.ceil().clamp(low, Vec2::new(width, height));
+    [
+        low.x as u32,
+        low.y as u32,
+        (high.x - low.x) as u32,
+        (high.y - low.y) as u32,
+    ]
 }
 
 fn targets(gpu: &Gpu, size: [u32; 2]) -> (Target, Target, Target) {
@@ -351,6 +390,36 @@ mod tests {
         let plan = plan("[surface]\nkind = \"plain\"");
         assert_eq!(names(&plan), ["tangents", "plain", "tonemap"]);
         assert!(plan.left_out.contains(&"planes-incremental"));
+    }
+
+    #[test]
+    fn everything_that_is_drawn_lies_in_the_part_that_is_shown() {
+        let view = View {
+            eye: Vec3::new(0.0, 0.0, 1.0),
+            target: Vec3::ZERO,
+            fov_y: 0.6,
+        };
+        let points = [Vec3::new(-0.1, 0.0, 0.0), Vec3::new(0.05, 0.1, 0.1)];
+        let tool = DrawnTool {
+            tip_m: Vec3::new(0.15, -0.1, 0.0),
+            axis_m: Vec3::ZERO,
+            radius_m: 0.05,
+        };
+        let [left, top, width, height] = drawn_part(&points, &[tool], &view, [400, 300]);
+        let clip_from_world = view.clip_from_world(4.0 / 3.0);
+        let rim = (0..64).map(|k| {
+            let (sin, cos) = (k as f32 * 0.1).sin_cos();
+            tool.tip_m + tool.radius_m * Vec3::new(cos, sin, 0.0)
+        });
+        for place in points.into_iter().chain(rim) {
+            let clip = clip_from_world.project_point3(place);
+            let (x, y) = (200.0 * (1.0 + clip.x), 150.0 * (1.0 - clip.y));
+            assert!((left as f32..(left + width) as f32).contains(&x), "{place}");
+            assert!((top as f32..(top + height) as f32).contains(&y), "{place}");
+        }
+        assert!(width < 400 && height < 300, "{width} x {height} is no part");
+        let behind = drawn_part(&[Vec3::new(0.0, 0.0, 2.0)], &[], &view, [400, 300]);
+        assert_eq!(behind, [0, 0, 400, 300]);
     }
 
     #[test]

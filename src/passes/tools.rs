@@ -1,5 +1,6 @@
 //! The tools, drawn over the tissue: one draw a frame, an instance a tool.
 
+use super::draw::kept;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, bind, compile, join, storage, uniform};
 use glam::{Mat4, Vec3};
 
@@ -173,15 +174,7 @@ impl Tools {
             .write_buffer(&self.tools, 0, bytemuck::cast_slice(&data));
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some(Self::NAME),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: color,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Load,
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
+            color_attachments: &[kept(color)],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: depth,
                 depth_ops: Some(wgpu::Operations {

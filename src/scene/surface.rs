@@ -103,7 +103,7 @@ impl Default for SurfaceSection {
         };
         Self {
             kind: SurfaceKind::default(),
-            samples: 6,
+            samples: 4,
             quadrature: Quadrature::default(),
             layer_depth_max_m: 0.006,
             // Ratios between the colours as published for blood-rich tissue; all of it about six
