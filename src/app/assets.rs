@@ -13,6 +13,8 @@ macro_rules! bundle {
 const FILES: &[(&str, &[u8])] = bundle![
     "organs/liver.glb",
     "organs/heart.glb",
+    "organs/kidney.glb",
+    "organs/spleen.glb",
     "textures/liver-outer.png",
     "textures/liver-normal.png",
     "textures/liver-inner.png",
@@ -21,6 +23,14 @@ const FILES: &[(&str, &[u8])] = bundle![
     "textures/heart-normal.png",
     "textures/heart-inner.png",
     "textures/heart-layers.png",
+    "textures/kidney-outer.png",
+    "textures/kidney-normal.png",
+    "textures/kidney-inner.png",
+    "textures/kidney-layers.png",
+    "textures/spleen-outer.png",
+    "textures/spleen-normal.png",
+    "textures/spleen-inner.png",
+    "textures/spleen-layers.png",
 ];
 
 /// Bundled scenes, the default one first.
@@ -28,6 +38,8 @@ const SCENES: &[(&str, &str)] = &[
     ("liver", include_str!("../../scenes/liver.toml")),
     ("liver-gooey", include_str!("../../scenes/liver-gooey.toml")),
     ("heart", include_str!("../../scenes/heart.toml")),
+    ("kidney", include_str!("../../scenes/kidney.toml")),
+    ("spleen", include_str!("../../scenes/spleen.toml")),
     ("slab", include_str!("../../scenes/slab.toml")),
 ];
 

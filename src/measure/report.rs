@@ -476,6 +476,7 @@ mod tests {
                 volume_drift: -0.012 * poke,
                 tool_force_n: 4.1 * poke,
                 penetration_m: 8e-5 * poke,
+                speed_max_m_s: 0.01 * poke,
             }
         };
         (0..300).map(record).collect()

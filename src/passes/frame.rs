@@ -335,9 +335,9 @@ fn drawn_part(points: &[Vec3], tools: &[DrawnTool], view: &View, size: [u32; 2])
     let clip_from_world = view.clip_from_world(width / height);
     let view_from_world = view.view_from_world();
     let scale = height / (2.0 * (0.5 * view.fov_y).tan());
-    let ends = tools.iter().flat_map(|tool| {
-        [tool.tip_m, tool.tip_m + tool.axis_m].map(|end| (end, tool.radius_m))
-    });
+    let ends = tools
+        .iter()
+        .flat_map(|tool| [tool.tip_m, tool.tip_m + tool.axis_m].map(|end| (end, tool.radius_m)));
     let (mut low, mut high) = (Vec2::splat(f32::INFINITY), Vec2::splat(f32::NEG_INFINITY));
     for (place, radius_m) in points.iter().map(|&p| (p, 0.0)).chain(ends) {
         let distance_m = -view_from_world.transform_point3(place).z;

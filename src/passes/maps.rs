@@ -61,11 +61,7 @@ fn square_roots(image: &RgbaImage) -> RgbaImage {
     image
 }
 
-fn upload(
-    gpu: &Gpu,
-    label: &str,
-    image: RgbaImage,
-) -> wgpu::TextureView {
+fn upload(gpu: &Gpu, label: &str, image: RgbaImage) -> wgpu::TextureView {
     // Four levels: further ones would mix charts of the atlas.
     let levels = 4.min(1 + image.width().min(image.height()).ilog2());
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
