@@ -56,15 +56,19 @@ fn refused(arguments: &[&str], words: &[&str]) {
     assert!(!message.contains("panicked"), "{arguments:?}: {message}");
 }
 
-/// Mean of a small simulation-only replay: its `summary.json`.
+/// The `summary.json` of a simulation-only replay of the slab, 40 frames long.
 fn replay(folder: &Folder, out: &str, more: &[&str]) -> serde_json::Value {
+    replay_frames(folder, out, "40", more)
+}
+
+fn replay_frames(folder: &Folder, out: &str, frames: &str, more: &[&str]) -> serde_json::Value {
     let out = folder.path(out);
     let mut arguments = vec![
         "replay",
         "slab",
         "--no-render",
         "--frames",
-        "40",
+        frames,
         "--out",
         &out,
     ];
@@ -150,7 +154,7 @@ fn a_summary_has_every_key_that_scripts_read() {
 #[test]
 fn a_pressed_slab_pushes_back_and_its_marker_sinks() {
     let folder = Folder::new("slab");
-    let summary = replay(&folder, "out", &["--frames", "80"]);
+    let summary = replay_frames(&folder, "out", "80", &[]);
     let force = summary["tool"]["force_max_n"].as_f64().expect("a force");
     assert!(force > 0.01, "{force} N");
     let sunk = summary["markers"][0]["displacement_m"][1]

@@ -176,7 +176,7 @@ fn a_mouse_push_moves_the_organ_is_answered_by_a_force_and_changes_the_picture()
     }
     let pushed = desk.picture(3);
     desk.tool(&["mouseup", "1"]);
-    desk.tool(&["windowquit", id]);
+    desk.tool(&["key", "ctrl+q"]);
     desk.wait_for("the window to close", || {
         window.0.try_wait().expect("the window's state").is_some()
     });

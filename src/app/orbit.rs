@@ -70,6 +70,15 @@ impl Orbit {
             (self.distance_m * (-0.12 * notches).exp()).clamp(0.3 * body_m, 20.0 * body_m);
     }
 
+    /// The same view from further back where the picture is narrower than it is meant for (4 : 3), so that its
+    /// sides are not cut off.
+    pub fn fitted(&self, aspect: f32) -> Self {
+        Self {
+            distance_m: self.distance_m * (4.0 / 3.0 / aspect).max(1.0),
+            ..*self
+        }
+    }
+
     /// The ray through a place of the picture: (0, 0) is its top left corner, (1, 1) its bottom right.
     pub fn ray(&self, at: Vec2, aspect: f32) -> Ray {
         let eye = self.eye();
@@ -115,6 +124,14 @@ mod tests {
         let straight = orbit().ray(Vec2::splat(0.5), 1.0).direction;
         let top = orbit().ray(Vec2::new(0.5, 0.0), 1.0).direction;
         assert!((straight.angle_between(top) - 0.3).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_narrow_picture_is_seen_from_further_back() {
+        assert_eq!(orbit().fitted(4.0 / 3.0), orbit());
+        assert_eq!(orbit().fitted(2.0), orbit());
+        let narrow = orbit().fitted(2.0 / 3.0);
+        assert!((narrow.distance_m - 2.0 * orbit().distance_m).abs() < 1e-5);
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::geom::plane::LightPathMethod;
 use crate::scene::SurfaceKind;
 use crate::sim::Method;
 use egui::{Align2, Color32, ComboBox, RichText, Slider, Ui};
-use egui_plot::{Bar, BarChart, Legend, Line, Plot, PlotPoints};
+use egui_plot::{Bar, BarChart, Line, Plot, PlotPoints};
 
 /// What the panel shows and what was switched in it.
 pub struct PanelState {
@@ -90,7 +90,8 @@ pub fn show(
 ) -> egui::Rect {
     if state.panel_open {
         egui::Panel::right("panel")
-            .default_size(300.0)
+            .resizable(false)
+            .exact_size(330.0)
             .show(ui, |ui| {
                 egui::ScrollArea::vertical().show(ui, |ui| {
                     run_section(ui, state, session, asks);
@@ -216,7 +217,7 @@ const STAGE_COLORS: [Color32; 8] = [
 ];
 
 fn stage_plot(ui: &mut Ui, history: &History) {
-    ui.label(RichText::new("frame time by stage [ms]").weak());
+    ui.label(RichText::new("frame time by stage [ms], the whole frame in white").weak());
     let mut charts: Vec<BarChart> = Vec::new();
     for (index, stage) in history.stages().into_iter().enumerate() {
         let bars = history
@@ -235,15 +236,23 @@ fn stage_plot(ui: &mut Ui, history: &History) {
         .enumerate()
         .map(|(frame, sample)| [frame as f64, f64::from(sample.wall_ms)])
         .collect();
-    still_plot("stages")
-        .height(150.0)
-        .legend(Legend::default())
-        .show(ui, |plot| {
-            for chart in charts {
-                plot.bar_chart(chart);
-            }
-            plot.line(Line::new("whole frame", wall).color(Color32::WHITE));
-        });
+    still_plot("stages").height(120.0).show(ui, |plot| {
+        for chart in charts {
+            plot.bar_chart(chart);
+        }
+        plot.line(Line::new("whole frame", wall).color(Color32::WHITE));
+    });
+    let last = history.last();
+    ui.horizontal_wrapped(|ui| {
+        for (index, stage) in history.stages().into_iter().enumerate() {
+            let ms = last.map_or(0.0, |sample| sample.stage_ms(stage));
+            ui.label(
+                RichText::new(format!("{stage} {ms:.1}"))
+                    .small()
+                    .color(STAGE_COLORS[index % STAGE_COLORS.len()]),
+            );
+        }
+    });
 }
 
 fn force_plot(ui: &mut Ui, history: &History) {
@@ -383,6 +392,7 @@ fn help(ui: &Ui, state: &mut PanelState) {
                     ("S or F12", "save a picture"),
                     ("Tab", "hide or show the panel"),
                     ("H or F1", "this list"),
+                    ("Escape or Ctrl+Q", "close the window"),
                 ] {
                     ui.strong(what);
                     ui.label(does);

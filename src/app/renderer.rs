@@ -79,11 +79,12 @@ impl Renderer {
         self.passes.set_knobs(&scene.surface);
     }
 
-    /// The camera that the scene asks for.
+    /// The camera that the scene asks for; moved back where the picture is narrow.
     pub fn scene_orbit(&self, session: &Session) -> Orbit {
         let camera = &session.scene.camera;
         let (eye, target) = camera.eye_and_target(&session.rest);
-        Orbit::new(eye, target, camera.fov_y_deg.to_radians())
+        let [width, height] = self.size();
+        Orbit::new(eye, target, camera.fov_y_deg.to_radians()).fitted(width as f32 / height as f32)
     }
 
     /// Draws one frame and waits for it.

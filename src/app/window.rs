@@ -122,6 +122,8 @@ struct Shown {
     session: Session,
     renderer: Renderer,
     orbit: Orbit,
+    /// Whether the user has moved the camera; until then it fits the picture.
+    camera_moved: bool,
     hand: Option<Hand>,
     drag: Drag,
     state: PanelState,
@@ -135,6 +137,8 @@ struct Shown {
     last_frame: Instant,
     owed_s: f32,
     pictures_taken: u32,
+    wants_to_close: bool,
+    control_held: bool,
 }
 
 /// What a moving mouse does.
@@ -173,7 +177,12 @@ impl ApplicationHandler for App {
                 }
             }
             WindowEvent::Resized(size) => shown.resize(size),
-            event => shown.input(&event),
+            event => {
+                shown.input(&event);
+                if shown.wants_to_close {
+                    event_loop.exit();
+                }
+            }
         }
     }
 
@@ -263,6 +272,7 @@ impl Shown {
             session,
             renderer,
             orbit,
+            camera_moved: false,
             hand: None,
             drag: Drag::Nothing,
             state,
@@ -274,6 +284,8 @@ impl Shown {
             last_frame: Instant::now(),
             owed_s: 0.0,
             pictures_taken: 0,
+            wants_to_close: false,
+            control_held: false,
         })
     }
 
@@ -320,6 +332,7 @@ impl Shown {
                 };
                 self.scrolled(notches);
             }
+            WindowEvent::ModifiersChanged(now) => self.control_held = now.state().control_key(),
             WindowEvent::CursorLeft { .. } if self.drag != Drag::Tool => self.drag = Drag::Nothing,
             WindowEvent::KeyboardInput { event, .. }
                 if event.state == ElementState::Pressed && !response.consumed =>
@@ -367,8 +380,14 @@ impl Shown {
     fn moved(&mut self, by: Vec2) {
         match self.drag {
             Drag::Nothing => {}
-            Drag::Orbit => self.orbit.turn(by),
-            Drag::Pan => self.orbit.pan(by),
+            Drag::Orbit => {
+                self.orbit.turn(by);
+                self.camera_moved = true;
+            }
+            Drag::Pan => {
+                self.orbit.pan(by);
+                self.camera_moved = true;
+            }
             Drag::Tool => {
                 let ray = self.cursor_ray();
                 if let Some(hand) = &mut self.hand {
@@ -386,6 +405,7 @@ impl Shown {
                 (knobs.depth_m + 0.01 * longest_m * notches).clamp(0.0, 0.3 * longest_m);
         } else {
             self.orbit.zoom(notches, longest_m);
+            self.camera_moved = true;
         }
     }
 
@@ -396,7 +416,9 @@ impl Shown {
             KeyCode::KeyR => self.reset(),
             KeyCode::KeyP => self.play_script(),
             KeyCode::KeyS | KeyCode::F12 => self.state.screenshot = true,
-            KeyCode::KeyC => self.orbit = self.renderer.scene_orbit(&self.session),
+            KeyCode::KeyC => self.reset_camera(),
+            KeyCode::Escape => self.wants_to_close = true,
+            KeyCode::KeyQ if self.control_held => self.wants_to_close = true,
             KeyCode::Tab => self.state.panel_open = !self.state.panel_open,
             KeyCode::F1 | KeyCode::KeyH => self.state.help_open = !self.state.help_open,
             _ => {}
@@ -407,6 +429,11 @@ impl Shown {
         self.session.reset();
         self.session.script_plays = false;
         self.history = History::default();
+    }
+
+    fn reset_camera(&mut self) {
+        self.orbit = self.renderer.scene_orbit(&self.session);
+        self.camera_moved = false;
     }
 
     fn play_script(&mut self) {
@@ -517,6 +544,9 @@ impl Shown {
         if self.renderer.size() != size {
             self.renderer.resize(size)?;
             self.show_new_picture();
+            if !self.camera_moved {
+                self.reset_camera();
+            }
         }
         Ok(())
     }
@@ -551,7 +581,7 @@ impl Shown {
                 Ok(())
             }
             PanelAsk::ResetCamera => {
-                self.orbit = self.renderer.scene_orbit(&self.session);
+                self.reset_camera();
                 Ok(())
             }
         };
@@ -568,7 +598,7 @@ impl Shown {
         self.renderer = renderer;
         self.hand = None;
         self.drag = Drag::Nothing;
-        self.orbit = self.renderer.scene_orbit(&self.session);
+        self.reset_camera();
         self.state.hand = HandKnobs::for_size(self.session.rest.longest_m());
         self.state.scene_name = name.to_owned();
         self.history = History::default();
