@@ -28,7 +28,6 @@ fn shaders() -> Vec<(&'static str, &'static [Wgsl])> {
         ("full planes, fit", PlaneFull::FIT_WGSL),
         ("incremental planes, moved", PlaneIncremental::MOVED_WGSL),
         ("incremental planes, update", PlaneIncremental::UPDATE_WGSL),
-        ("incremental planes, commit", PlaneIncremental::COMMIT_WGSL),
         ("shadow", Shadow::WGSL),
         ("light map", LightMap::WGSL),
         ("blur", LightMap::BLUR_WGSL),
@@ -120,7 +119,6 @@ fn mirrors() -> Vec<Mirror> {
         full(PlaneFull::SORT_WGSL),
         full(PlaneFull::FIT_WGSL),
         moved(PlaneIncremental::MOVED_WGSL),
-        moved(PlaneIncremental::COMMIT_WGSL),
         mirror!(
             PlaneIncremental::UPDATE_WGSL,
             "Params",

@@ -50,8 +50,7 @@ pub struct Updated {
 
 /// Planes of all points that follow moved points by their running moments.
 ///
-/// Twin of `shaders/plane_moved.wgsl`, `shaders/plane_incremental.wgsl` and
-/// `shaders/plane_commit.wgsl`.
+/// Twin of `shaders/plane_moved.wgsl` and `shaders/plane_incremental.wgsl`.
 #[derive(Clone, Debug)]
 pub struct RunningPlanes {
     /// Quanta a unit (and a squared unit): the finest power of two that no patch can overflow.
@@ -381,23 +380,23 @@ mod tests {
     fn stretch_beyond_the_range_takes_a_larger_unit_and_returns() {
         let mut body = body();
         let rest = body.points.clone();
+        let units =
+            |body: &Body| -> Vec<f32> { body.running.sums.iter().map(|sums| sums.per_m).collect() };
+        let at_rest = units(&body);
         let stretched: Vec<Vec3> = deformed(&rest).iter().map(|&p| 100.0 * p).collect();
         body.update(0.0, &stretched);
         assert!(
-            body.running
-                .sums
+            units(&body)
                 .iter()
-                .all(|s| s.per_m < body.running.rest_per_m)
+                .zip(&at_rest)
+                .all(|(now, rest)| now < rest)
         );
-        assert!(body.worst_degrees(&stretched) < 0.05);
+        let worst = body.worst_degrees(&stretched);
+        assert!(worst < 0.05, "{worst} degrees stretched");
         body.update(0.0, &rest);
-        assert!(
-            body.running
-                .sums
-                .iter()
-                .all(|s| s.per_m == body.running.rest_per_m)
-        );
-        assert!(body.worst_degrees(&rest) < 0.02);
+        assert_eq!(units(&body), at_rest);
+        let worst = body.worst_degrees(&rest);
+        assert!(worst < 0.02, "{worst} degrees after return");
     }
 
     #[test]
