@@ -45,8 +45,8 @@ struct Sums {
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
-// where the sums have each slot and where they are to have it, with its point in w
-@group(0) @binding(1) var committed: texture_2d<f32>;
+// where the sums have each moved slot and where they are to have every slot, with its point in w
+@group(0) @binding(1) var before: texture_2d<f32>;
 @group(0) @binding(2) var now: texture_2d<f32>;
 // which slots of each leaf moved
 @group(0) @binding(3) var moved: texture_2d<u32>;
@@ -59,6 +59,8 @@ struct Sums {
 @group(0) @binding(8) var<storage, read_write> sums: array<Sums>;
 @group(0) @binding(9) var<storage, read_write> frame: Frame;
 @group(0) @binding(10) var<storage, read_write> planes: array<vec4f>;
+// what the next frame's points are held against
+@group(0) @binding(11) var committed: texture_storage_2d<rgba32float, write>;
 
 fn rounded(d: vec3f) -> vec3i {
     return vec3i(round(d * params.quanta));
@@ -95,6 +97,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
     atomicAdd(&frame.refitted, 1u);
 
     let here = textureLoad(now, entry(slot), 0);
+    // A point is in its own patch, so each moved one comes by here.
+    if (textureLoad(moved, entry(slot / 32u), 0).x & (1u << (slot % 32u))) != 0u {
+        textureStore(committed, entry(slot), here);
+    }
     var origin = here.xyz;
     var per_m = params.rest_per_m;
     var sum = vec3i(0);
@@ -112,7 +118,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
             var bits = block.y & textureLoad(moved, entry(block.x), 0).x;
             for (; bits != 0u; bits &= bits - 1u) {
                 let member = entry(32u * block.x + firstTrailingBit(bits));
-                let old_d = (textureLoad(committed, member, 0).xyz - origin) * per_m;
+                let old_d = (textureLoad(before, member, 0).xyz - origin) * per_m;
                 let new_d = (textureLoad(now, member, 0).xyz - origin) * per_m;
                 usable = usable && longest_side(new_d) <= RANGE;
                 sum += change(new_d, old_d);

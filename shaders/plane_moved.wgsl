@@ -39,15 +39,17 @@ struct Frame {
 @group(0) @binding(3) var<storage, read> run_start: array<u32>;
 // leaf, members: the patches that points of a run of 8 slots are in
 @group(0) @binding(4) var run_blocks: texture_2d<u32>;
-// the same as `committed` for slots that do not move
+// where the sums are to have each slot: the same as `committed` for slots that do not move
 @group(0) @binding(5) var now: texture_storage_2d<rgba32float, write>;
+// where the sums had each slot that moves
+@group(0) @binding(6) var before: texture_storage_2d<rgba32float, write>;
 // a bit a slot, by leaf
-@group(0) @binding(6) var moved: texture_storage_2d<r32uint, write>;
+@group(0) @binding(7) var moved: texture_storage_2d<r32uint, write>;
 // zeros at the start of the frame
-@group(0) @binding(7) var<storage, read_write> frame: Frame;
-@group(0) @binding(8) var<storage, read_write> listed: array<u32>;
+@group(0) @binding(8) var<storage, read_write> frame: Frame;
+@group(0) @binding(9) var<storage, read_write> listed: array<u32>;
 // workgroups of the next kernel; x is zero at the start of the frame
-@group(0) @binding(9) var<storage, read_write> workgroups: array<atomic<u32>, 3>;
+@group(0) @binding(10) var<storage, read_write> workgroups: array<atomic<u32>, 3>;
 
 // Marks and lists the patches that points of this run of 8 slots are in.
 fn list_patches(run: u32) {
@@ -84,6 +86,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         let d = place - old.xyz;
         if dot(d, d) > params.tolerance_squared_m2 {
             bits |= 1u << i;
+            textureStore(before, entry(first + i), old);
             textureStore(now, entry(first + i), vec4f(place, old.w));
         }
     }

@@ -15,6 +15,10 @@ pub mod ray;
 pub mod tangent;
 pub mod unwrap;
 
+#[cfg(test)]
+#[path = "../../tests/support/surfaces.rs"]
+mod surfaces;
+
 use glam::{Vec2, Vec3};
 
 /// A closed triangle surface with texture coordinates.

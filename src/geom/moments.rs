@@ -50,8 +50,7 @@ pub struct Updated {
 
 /// Planes of all points that follow moved points by their running moments.
 ///
-/// Twin of `shaders/plane_moved.wgsl`, `shaders/plane_incremental.wgsl` and
-/// `shaders/plane_commit.wgsl`.
+/// Twin of `shaders/plane_moved.wgsl` and `shaders/plane_incremental.wgsl`.
 #[derive(Clone, Debug)]
 pub struct RunningPlanes {
     /// Quanta a unit (and a squared unit): the finest power of two that no patch can overflow.
@@ -278,4 +277,137 @@ fn widest_m(points: &[Vec3], patches: &Patches) -> f32 {
         .fold(0.0, f32::max)
         .sqrt();
     if widest > 0.0 { widest } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::plane::fit_planes;
+    use crate::geom::surfaces::{deformed, wavy};
+    use crate::geom::tangent::{Fans, point_normals, rest_normals};
+
+    struct Body {
+        points: Vec<Vec3>,
+        fans: Fans,
+        normals: Vec<Vec3>,
+        patches: Patches,
+        running: RunningPlanes,
+    }
+
+    fn body() -> Body {
+        let mesh = wavy(24);
+        let fans = Fans::new(&mesh);
+        let normals = rest_normals(&mesh, &fans);
+        let patches = Patches::new(&mesh.points, &normals, 0.02);
+        Body {
+            running: RunningPlanes::new(&mesh.points, &normals, &patches),
+            points: mesh.points,
+            fans,
+            normals,
+            patches,
+        }
+    }
+
+    impl Body {
+        fn update(&mut self, tolerance_m: f32, points: &[Vec3]) -> Updated {
+            let normals = point_normals(&self.fans, points, &self.normals);
+            self.running
+                .update(tolerance_m, points, &normals, &self.patches)
+        }
+
+        /// Largest angle [degrees] to the planes fitted from all members.
+        fn worst_degrees(&self, points: &[Vec3]) -> f32 {
+            let normals = point_normals(&self.fans, points, &self.normals);
+            let fitted = fit_planes(points, &normals, &self.patches);
+            self.running
+                .planes
+                .iter()
+                .zip(fitted)
+                .map(|(running, full)| running.normal.cross(full.normal).length())
+                .fold(0.0, f32::max)
+                .asin()
+                .to_degrees()
+        }
+    }
+
+    /// Every fortieth point shaken, each by its own rhythm: no patch has a sixth of its members moved.
+    fn shaken(rest: &[Vec3], frame: usize) -> Vec<Vec3> {
+        let mut points = rest.to_vec();
+        for (i, point) in points.iter_mut().enumerate().step_by(40) {
+            point.y += 0.002 * ((i * 7 + frame * (i % 5 + 1)) as f32).sin();
+        }
+        points
+    }
+
+    #[test]
+    fn sums_return_to_the_same_bits_when_the_points_return() {
+        let mut body = body();
+        let rest = body.points.clone();
+        let at_rest = body.running.sums.clone();
+        for frame in 0..500 {
+            assert!(body.update(0.0, &shaken(&rest, frame)).moved > 0);
+        }
+        assert_ne!(body.running.sums, at_rest);
+        body.update(0.0, &rest);
+        assert_eq!(body.running.sums, at_rest);
+    }
+
+    #[test]
+    fn planes_are_those_of_a_full_fit_wherever_the_body_goes() {
+        let mut body = body();
+        let rest = body.points.clone();
+        for frame in 0..40 {
+            let drift = Vec3::new(0.3, -0.1, 0.2) * frame as f32;
+            let points: Vec<Vec3> = shaken(&rest, frame).iter().map(|&p| p + drift).collect();
+            body.update(0.0, &points);
+            let worst = body.worst_degrees(&points);
+            // Both are f32; 0.003 degrees was seen 10 m away.
+            assert!(worst < 0.02, "{worst} degrees in frame {frame}");
+        }
+    }
+
+    #[test]
+    fn motion_within_the_tolerance_is_not_counted_until_it_adds_up() {
+        let mut body = body();
+        let rest = body.points.clone();
+        let risen = |by_m: f32| -> Vec<Vec3> { rest.iter().map(|&p| p + by_m * Vec3::X).collect() };
+        assert_eq!(body.update(1e-4, &risen(0.6e-4)), Updated::default());
+        assert_eq!(body.update(1e-4, &risen(0.9e-4)), Updated::default());
+        assert_eq!(body.update(1e-4, &risen(1.2e-4)).moved, 576);
+    }
+
+    #[test]
+    fn stretch_beyond_the_range_takes_a_larger_unit_and_returns() {
+        let mut body = body();
+        let rest = body.points.clone();
+        let units =
+            |body: &Body| -> Vec<f32> { body.running.sums.iter().map(|sums| sums.per_m).collect() };
+        let at_rest = units(&body);
+        let stretched: Vec<Vec3> = deformed(&rest).iter().map(|&p| 100.0 * p).collect();
+        body.update(0.0, &stretched);
+        assert!(
+            units(&body)
+                .iter()
+                .zip(&at_rest)
+                .all(|(now, rest)| now < rest)
+        );
+        let worst = body.worst_degrees(&stretched);
+        assert!(worst < 0.05, "{worst} degrees stretched");
+        body.update(0.0, &rest);
+        assert_eq!(units(&body), at_rest);
+        let worst = body.worst_degrees(&rest);
+        assert!(worst < 0.02, "{worst} degrees after return");
+    }
+
+    #[test]
+    fn no_patch_can_overflow_its_sums() {
+        for members in [1, 3, 16, 200, 1000, 1024, 1025, 40_000] {
+            let largest = f64::from(RANGE * RANGE * quanta_for(members));
+            assert!(largest <= f64::from(1 << 22), "{members} members");
+            assert!(
+                largest * f64::from(members) <= f64::from(1 << 30),
+                "{members} members"
+            );
+        }
+    }
 }

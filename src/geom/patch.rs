@@ -297,3 +297,118 @@ fn add_members(list: &mut Vec<Block>, block: Block) {
         Err(at) => list.insert(at, block),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::surfaces::wavy;
+    use crate::geom::tangent::{Fans, rest_normals};
+    use proptest::prelude::*;
+
+    fn wavy_patches(side: usize, radius_m: f32) -> (Vec<Vec3>, Patches) {
+        let mesh = wavy(side);
+        let normals = rest_normals(&mesh, &Fans::new(&mesh));
+        let patches = Patches::new(&mesh.points, &normals, radius_m);
+        (mesh.points, patches)
+    }
+
+    fn are_symmetric(lists: &[Vec<usize>]) -> bool {
+        lists.iter().enumerate().all(|(point, members)| {
+            members.contains(&point) && members.iter().all(|&m| lists[m].contains(&point))
+        })
+    }
+
+    #[test]
+    fn symmetry_check_rejects_a_patch_that_lost_a_member() {
+        let (points, patches) = wavy_patches(9, 0.03);
+        let mut lists: Vec<Vec<usize>> = (0..points.len())
+            .map(|point| patches.members(point).collect())
+            .collect();
+        assert!(are_symmetric(&lists));
+        lists[40].pop();
+        assert!(!are_symmetric(&lists));
+    }
+
+    #[test]
+    fn patch_of_200_points_meets_few_leaves() {
+        let (points, patches) = wavy_patches(100, 0.0083);
+        let members: u32 = (0..points.len())
+            .map(|slot| patches.member_count(slot))
+            .sum();
+        let per_patch = patches.lists.blocks.len() as f32 / points.len() as f32;
+        assert!(members as usize / points.len() > 180);
+        // 11.2 measured; a list of indices would be as long as 100 blocks.
+        assert!(per_patch < 15.0, "{per_patch} blocks");
+    }
+
+    #[test]
+    fn points_of_the_other_side_of_a_thin_lobe_are_left_out() {
+        let mesh = wavy(12);
+        let mut points = mesh.points.clone();
+        points.extend(mesh.points.iter().map(|&p| p - 0.001 * Vec3::Y));
+        let mut normals = vec![Vec3::Y; 144];
+        normals.extend(vec![Vec3::NEG_Y; 144]);
+        let patches = Patches::new(&points, &normals, 0.03);
+        assert!((0..144).all(|point| patches.members(point).all(|member| member < 144)));
+    }
+
+    #[test]
+    fn small_radius_still_gives_the_sixteen_nearest() {
+        for radius_m in [0.0, 1e-6, f32::NAN] {
+            let (points, patches) = wavy_patches(12, radius_m);
+            assert!((0..points.len()).all(|slot| patches.member_count(slot) >= 16));
+        }
+    }
+
+    #[test]
+    fn runs_list_the_patches_of_their_points_and_no_others() {
+        let (_, patches) = wavy_patches(13, 0.02);
+        let runs = patches.patches_of_runs();
+        assert_eq!(runs.start.len(), 4 * patches.leaf_count() + 1);
+        for run in 0..4 * patches.leaf_count() {
+            let first = run * RUN_SLOTS;
+            let mut expected: Vec<usize> = (first..(first + RUN_SLOTS).min(169))
+                .flat_map(|slot| patches.lists.of(slot))
+                .flat_map(|block| block.slots())
+                .collect();
+            expected.sort_unstable();
+            expected.dedup();
+            let listed = runs.of(run).iter().flat_map(|block| block.slots());
+            assert_eq!(listed.collect::<Vec<_>>(), expected);
+        }
+    }
+
+    #[test]
+    fn radius_of_published_coefficients_is_the_published_depth() {
+        // Extinction 1.6/mm leaves one hundredth after 2.9 mm.
+        let radius_m = radius_from_extinction_m(1600.0, 0.01);
+        assert!((radius_m - 2.878e-3).abs() < 1e-6, "{radius_m} m");
+    }
+
+    proptest! {
+        #[test]
+        fn patches_are_symmetric_and_hold_all_within_the_radius(
+            coordinates in prop::collection::vec(prop::array::uniform3(-0.05_f32..0.05), 1..150),
+            radius_m in 0.005_f32..0.06,
+        ) {
+            let points: Vec<Vec3> = coordinates.into_iter().map(Vec3::from).collect();
+            let normals: Vec<Vec3> = points.iter().map(|p| p.normalize_or(Vec3::Y)).collect();
+            let patches = Patches::new(&points, &normals, radius_m);
+            let lists: Vec<Vec<usize>> = (0..points.len())
+                .map(|point| patches.members(point).collect())
+                .collect();
+            prop_assert!(are_symmetric(&lists));
+            for (i, list) in lists.iter().enumerate() {
+                let belongs = |&j: &usize| {
+                    points[i].distance_squared(points[j]) <= radius_m * radius_m
+                        && normals[i].dot(normals[j]) > 0.0
+                };
+                let near: Vec<usize> = (0..points.len()).filter(belongs).collect();
+                prop_assert!(near.iter().all(|j| list.contains(j)));
+                let facing = |&j: &usize| normals[i].dot(normals[j]) > 0.0;
+                let facing = (0..points.len()).filter(facing).count();
+                prop_assert!(list.len() >= facing.min(MEMBERS_MIN));
+            }
+        }
+    }
+}

@@ -253,3 +253,137 @@ pub fn exact_plane(
     };
     Some((outward, outward.dot(mean - at)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Quat;
+    use proptest::prelude::*;
+
+    /// Points spread evenly over a cap of chord `r_m` of a sphere, seen from its top at the origin.
+    fn cap(radius_m: f32, r_m: f32) -> Vec<Vec3> {
+        let deepest = r_m * r_m / (2.0 * radius_m);
+        (0..4000)
+            .map(|i| {
+                // Archimedes: equal heights have equal areas. The turn is the golden angle.
+                let depth = deepest * (i as f32 + 0.5) / 4000.0;
+                let ring = (depth * (2.0 * radius_m - depth)).sqrt();
+                let around = 2.399_963_2 * i as f32;
+                Vec3::new(ring * around.cos(), -depth, ring * around.sin())
+            })
+            .collect()
+    }
+
+    #[test]
+    fn plane_of_a_spherical_cap_is_level_and_a_quarter_of_r_squared_over_radius_deep() {
+        for (radius_m, r_m) in [(0.05, 0.01), (0.05, 0.002), (0.2, 0.03)] {
+            let plane = fit_plane(cap(radius_m, r_m).into_iter(), Vec3::ZERO, Vec3::Y);
+            let exact = -r_m * r_m / (4.0 * radius_m);
+            assert!(plane.normal.angle_between(Vec3::Y) < 1e-3);
+            assert!(
+                (plane.offset_m / exact - 1.0).abs() < 1e-3,
+                "{plane:?} for {exact}"
+            );
+        }
+    }
+
+    #[test]
+    fn offset_is_negative_on_a_bulge_and_positive_in_a_hollow() {
+        let bulge = cap(0.05, 0.01);
+        assert!(fit_plane(bulge.iter().copied(), Vec3::ZERO, Vec3::Y).offset_m < 0.0);
+        assert!(fit_plane(bulge.into_iter(), Vec3::ZERO, Vec3::NEG_Y).offset_m > 0.0);
+    }
+
+    #[test]
+    fn places_without_a_thinnest_direction_give_the_tangent_plane() {
+        let line = |i: i32| Vec3::new(0.3, 0.1, -0.2) * 0.001 * i as f32;
+        let octahedron = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| [axis, -axis]);
+        for (name, members) in [
+            ("no members", Vec::new()),
+            ("two members", vec![Vec3::X, Vec3::Z]),
+            ("one place", vec![Vec3::ONE; 20]),
+            ("one line", (0..20).map(line).collect()),
+            (
+                "alike in all directions",
+                octahedron.as_flattened().to_vec(),
+            ),
+        ] {
+            let at = members.first().copied().unwrap_or(Vec3::ONE);
+            let plane = fit_plane(members.into_iter(), at, Vec3::Y);
+            assert_eq!(plane, Plane::tangent(Vec3::Y), "{name}");
+        }
+    }
+
+    #[test]
+    fn spread_that_is_no_number_has_no_direction() {
+        for bad in [f32::NAN, f32::INFINITY, 0.0, -1.0] {
+            let spread = Spread {
+                squares: Vec3::splat(bad),
+                products: Vec3::ZERO,
+            };
+            assert_eq!(thinnest_direction(spread), None);
+        }
+    }
+
+    #[test]
+    fn method_names_are_those_of_scene_files() {
+        for method in LightPathMethod::ALL {
+            let written = serde_json::to_string(&method).expect("can be written");
+            assert_eq!(written, format!("\"{}\"", method.name()));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn plane_of_any_patch_is_that_of_f64(
+            heights in prop::collection::vec(-1.0_f32..1.0, 12..200),
+            turn in prop::array::uniform4(-1.0_f32..1.0),
+            away_m in prop::array::uniform3(-10.0_f32..10.0),
+        ) {
+            let turn = Quat::from_array(turn);
+            prop_assume!(turn.length() > 0.1);
+            let turn = turn.normalize();
+            // 1 cm wide, up to a quarter as thick.
+            let members: Vec<Vec3> = heights
+                .iter()
+                .enumerate()
+                .map(|(i, height)| {
+                    let around = 2.399_963_2 * i as f32;
+                    let ring = 0.01 * ((i as f32 + 0.5) / heights.len() as f32).sqrt();
+                    let local =
+                        Vec3::new(ring * around.cos(), 0.0025 * height, ring * around.sin());
+                    turn * local + Vec3::from(away_m)
+                })
+                .collect();
+            let (at, normal) = (members[0], turn * Vec3::Y);
+            let plane = fit_plane(members.iter().copied(), at, normal);
+            let (exact, offset_m) = exact_plane(
+                members.iter().map(|m| m.as_dvec3()),
+                at.as_dvec3(),
+                normal.as_dvec3(),
+            )
+            .expect("three members");
+            let degrees = plane.normal.as_dvec3().angle_between(exact).to_degrees();
+            prop_assert!(degrees <= 0.05, "{degrees} degrees");
+            // 0.05 degrees over the width of the patch.
+            prop_assert!((f64::from(plane.offset_m) - offset_m).abs() < 1e-5);
+        }
+
+        #[test]
+        fn plane_written_in_a_frame_and_carried_back_is_the_same(
+            turn in prop::array::uniform4(-1.0_f32..1.0),
+            offset_m in -0.01_f32..0.01,
+            handedness in prop::bool::ANY,
+        ) {
+            let turn = Quat::from_array(turn);
+            prop_assume!(turn.length() > 0.1);
+            let turn = turn.normalize();
+            let side = if handedness { 1.0 } else { -1.0 };
+            let plane = Plane { normal: turn * Vec3::new(0.6, 0.0, 0.8), offset_m };
+            let local = plane_in_frame(plane, turn * Vec3::X, side, turn * Vec3::Z);
+            let back = carried_plane(local, turn * Vec3::X, side, turn * Vec3::Z);
+            prop_assert!(back.normal.distance(plane.normal) < 1e-5);
+            prop_assert_eq!(back.offset_m, plane.offset_m);
+        }
+    }
+}

@@ -289,3 +289,117 @@ pub fn exact_normals(mesh: &SurfaceMesh, points: &[Vec3]) -> Vec<Option<DVec3>> 
     }
     areas.into_iter().map(DVec3::try_normalize).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::surfaces::{sphere, wavy};
+    use glam::Mat3;
+    use proptest::prelude::*;
+
+    /// Largest angle between normals and radii from 22.5 degrees north to as far south.
+    fn worst_sphere_normal(meridians: usize) -> f32 {
+        let mesh = sphere(0.05, meridians, meridians / 2 - 1);
+        let normals = rest_normals(&mesh, &Fans::new(&mesh));
+        normals
+            .iter()
+            .zip(&mesh.points)
+            .filter(|(_, point)| point.y.abs() < 0.0201)
+            .map(|(normal, point)| normal.cross(point.normalize()).length())
+            .fold(0.0, f32::max)
+    }
+
+    #[test]
+    fn normals_of_a_sphere_are_radial_and_their_error_falls_fourfold_on_a_mesh_twice_as_fine() {
+        let (coarse, fine) = (worst_sphere_normal(32), worst_sphere_normal(64));
+        assert!(coarse < 0.01, "{coarse} radians");
+        assert!(
+            (coarse / fine - 4.0).abs() < 0.5,
+            "{coarse} falls to {fine}"
+        );
+    }
+
+    #[test]
+    fn each_triangle_is_in_the_fans_of_its_three_corners() {
+        let mesh = sphere(0.05, 12, 5);
+        let fans = Fans::new(&mesh);
+        assert_eq!(fans.point_corners.len(), 3 * mesh.triangles.len());
+        assert_eq!(fans.vertex_corners.len(), 3 * mesh.triangles.len());
+        let poles = [0, mesh.points.len() - 1];
+        for pole in poles {
+            assert_eq!(fans.point_start[pole + 1] - fans.point_start[pole], 12);
+        }
+        assert!(fans.point_start.is_sorted() && fans.vertex_start.is_sorted());
+    }
+
+    #[test]
+    fn vertices_of_a_seam_share_a_point_and_keep_their_own_gradients() {
+        let mut mesh = sphere(0.05, 12, 5);
+        // The last column of the map is thirteen times as wide as the others.
+        let on_last_meridian = mesh.uvs.iter_mut().filter(|uv| uv.x == 1.0);
+        on_last_meridian.for_each(|uv| uv.x = 2.0);
+        let fans = Fans::new(&mesh);
+        let normals = rest_normals(&mesh, &fans);
+        let frames = tangent_frames(&fans, &mesh.point_of, &mesh.points, &normals, f32::MAX);
+        // Vertices of the third parallel.
+        let (first, last) = (3 * 13, 3 * 13 + 12);
+        assert_eq!(mesh.point_of[first], mesh.point_of[last]);
+        let steepness = |vertex: usize| frames[vertex].uv_gradients[0].length();
+        let ratio = steepness(last) / steepness(first);
+        assert!((ratio - 13.0).abs() < 0.01, "{ratio}");
+    }
+
+    #[test]
+    fn gradients_of_a_squashed_fan_grow_to_the_limit_and_no_further() {
+        let mesh = wavy(9);
+        let fans = Fans::new(&mesh);
+        let rest = rest_normals(&mesh, &fans);
+        let limit = gradient_max_per_m(&mesh, &fans, &rest);
+        for squash in [1.0, 0.1, 1e-3, 1e-6, 1e-12, 0.0] {
+            let points: Vec<Vec3> = mesh.points.iter().map(|&p| p * squash).collect();
+            let normals = point_normals(&fans, &points, &rest);
+            for frame in tangent_frames(&fans, &mesh.point_of, &points, &normals, limit) {
+                let longest = frame.uv_gradients.map(Vec3::length);
+                assert!(
+                    longest.into_iter().all(|l| l <= 1.0001 * limit),
+                    "{longest:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn any_perpendicular_is_unit_and_across_for_every_axis() {
+        for n in [Vec3::X, Vec3::Y, Vec3::NEG_Z, Vec3::ONE.normalize()] {
+            let t = any_perpendicular(n);
+            assert!(t.dot(n).abs() < 1e-6 && (t.length() - 1.0).abs() < 1e-6);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn gradients_are_dual_to_the_axes_of_any_affine_map(
+            entries in prop::array::uniform9(-0.5_f32..0.5),
+        ) {
+            let map = Mat3::from_cols_array(&entries) + Mat3::IDENTITY;
+            prop_assume!(map.determinant() > 0.2);
+            let mut mesh = wavy(5);
+            let flat = |uv: &Vec2| 0.1 * Vec3::new(uv.x, 0.0, uv.y);
+            mesh.points = mesh.uvs.iter().map(|uv| map * flat(uv)).collect();
+            let fans = Fans::new(&mesh);
+            let normals = rest_normals(&mesh, &fans);
+            let frames =
+                tangent_frames(&fans, &mesh.point_of, &mesh.points, &normals, f32::MAX);
+            let [pu, pv] = [map * Vec3::X * 0.1, map * Vec3::Z * 0.1];
+            for frame in frames {
+                let [gu, gv] = frame.uv_gradients;
+                // Rounding of edges a few millimetres long: 1e-5 seen.
+                for (product, exact) in
+                    [(gu.dot(pu), 1.0), (gu.dot(pv), 0.0), (gv.dot(pu), 0.0), (gv.dot(pv), 1.0)]
+                {
+                    prop_assert!((product - exact).abs() < 1e-3, "{product} for {exact}");
+                }
+            }
+        }
+    }
+}

@@ -1,5 +1,5 @@
-//! Planes fitted where something moved, from running moments: three dispatches, of which the second
-//! and third do nothing where nothing moved.
+//! Planes fitted where something moved, from running moments: two dispatches, the second of which
+//! is empty where nothing moved.
 
 use super::light_path::RefitCounts;
 use super::mesh_buffers::MeshBuffers;
@@ -15,10 +15,10 @@ use glam::Vec3;
 
 /// Of the update, a thread a patch; the same in `plane_moved.wgsl`, which counts workgroups.
 const PATCH_WORKGROUP_SIZE: u32 = 64;
-/// Of the other two, a thread a leaf: small, since there are few leaves to share out.
+/// Of the other, a thread a leaf: small, since there are few leaves to share out.
 const LEAF_WORKGROUP_SIZE: u32 = 8;
 
-/// Mirror of `Params` in `shaders/plane_moved.wgsl` and `shaders/plane_commit.wgsl`.
+/// Mirror of `Params` in `shaders/plane_moved.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct MovedParams {
@@ -42,7 +42,6 @@ pub struct UpdateParams {
 pub struct PlaneIncremental {
     moved_kernel: Kernel,
     update_kernel: Kernel,
-    commit_kernel: Kernel,
     leaf_workgroups: u32,
     /// Points moved, planes fitted and patches listed in the frame, then a mark for each slot.
     frame: wgpu::Buffer,
@@ -62,8 +61,6 @@ impl PlaneIncremental {
     /// The WGSL that updates and fits, joined in this order.
     pub const UPDATE_WGSL: &'static [Wgsl] =
         wgsl!["common.wgsl", "plane_fit.wgsl", "plane_incremental.wgsl"];
-    /// The WGSL that takes over the moved places, joined in this order.
-    pub const COMMIT_WGSL: &'static [Wgsl] = wgsl!["common.wgsl", "plane_commit.wgsl"];
 
     /// Builds the pass with the sums and planes of `points` at rest.
     ///
@@ -80,7 +77,7 @@ impl PlaneIncremental {
         tangents: &Tangents,
     ) -> Result<Self, GpuError> {
         let rest = RunningPlanes::new(points, normals, patches);
-        let sources = [Self::MOVED_WGSL, Self::UPDATE_WGSL, Self::COMMIT_WGSL].map(join);
+        let sources = [Self::MOVED_WGSL, Self::UPDATE_WGSL].map(join);
         Self::with_sources(
             gpu,
             tolerance_m,
@@ -92,8 +89,8 @@ impl PlaneIncremental {
         )
     }
 
-    /// As [`PlaneIncremental::new`] from sums that are already made and with other WGSL for finding,
-    /// updating and committing: lets a test sabotage a kernel and see the check fail.
+    /// As [`PlaneIncremental::new`] from sums that are already made and with other WGSL for finding
+    /// and updating: lets a test sabotage a kernel and see the check fail.
     ///
     /// # Errors
     ///
@@ -105,7 +102,7 @@ impl PlaneIncremental {
         patches: &Patches,
         buffers: &MeshBuffers,
         tangents: &Tangents,
-        [moved_source, update_source, commit_source]: &[String; 3],
+        [moved_source, update_source]: &[String; 2],
     ) -> Result<Self, GpuError> {
         let slot_count = patches.order.len();
         let leaf_count = patches.leaf_count();
@@ -117,6 +114,7 @@ impl PlaneIncremental {
             .map(|(p, &point)| [p.x, p.y, p.z, point as f32])
             .collect();
         let now = Table::new(gpu, "places by slot", Entry::Floats, &places)?;
+        let before = Table::new(gpu, "places before", Entry::Floats, &places)?;
         let committed = Table::new(gpu, "committed places", Entry::Floats, &places)?;
         let blocks = Table::new(gpu, "patch members", Entry::Pairs, &patches.lists.blocks)?;
         let moved = Table::new(gpu, "moved slots", Entry::Words, &rest.moved)?;
@@ -156,6 +154,7 @@ impl PlaneIncremental {
                 Binding::Read(&storage(gpu, "patches of runs", &of_runs.start)?),
                 Binding::Integers(&run_blocks.view),
                 Binding::Image(&now.view, Entry::Floats.format()),
+                Binding::Image(&before.view, Entry::Floats.format()),
                 Binding::Image(&moved.view, Entry::Words.format()),
                 Binding::Write(&frame),
                 Binding::Write(&listed),
@@ -179,7 +178,7 @@ impl PlaneIncremental {
                         pad1: 0,
                     },
                 )),
-                Binding::Unfiltered(&committed.view),
+                Binding::Unfiltered(&before.view),
                 Binding::Unfiltered(&now.view),
                 Binding::Integers(&moved.view),
                 Binding::Integers(&ranges.view),
@@ -189,25 +188,12 @@ impl PlaneIncremental {
                 Binding::Write(&sums),
                 Binding::Write(&frame),
                 Binding::Write(&planes),
-            ],
-        )?;
-        let commit_kernel = Kernel::new(
-            gpu,
-            Self::NAME,
-            Self::COMMIT_WGSL,
-            commit_source,
-            "main",
-            &[
-                Binding::Uniform(&moved_params),
-                Binding::Integers(&moved.view),
-                Binding::Unfiltered(&now.view),
                 Binding::Image(&committed.view, Entry::Floats.format()),
             ],
         )?;
         Ok(Self {
             moved_kernel,
             update_kernel,
-            commit_kernel,
             leaf_workgroups: workgroups(
                 gpu,
                 Self::NAME,
@@ -232,7 +218,6 @@ impl PlaneIncremental {
         self.moved_kernel.dispatch(&mut pass, self.leaf_workgroups);
         self.update_kernel
             .dispatch_indirect(&mut pass, &self.update_workgroups, 0);
-        self.commit_kernel.dispatch(&mut pass, self.leaf_workgroups);
     }
 
     /// What the last submitted frame found and fitted, waited for.

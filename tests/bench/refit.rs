@@ -5,6 +5,7 @@
 //! place, `scattered` as many all over, which is the worst case for a method that skips what is
 //! still. `stale` and `tangent` have no pass; their errors say what that saves.
 
+#[allow(dead_code, reason = "one of the shared surfaces is enough here")]
 #[path = "../support/surfaces.rs"]
 mod surfaces;
 

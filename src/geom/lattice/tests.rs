@@ -1,3 +1,5 @@
+//! The lattice against hand-made and real surfaces.
+
 use super::*;
 use crate::geom::volume_m3;
 use glam::{Vec2, Vec3};

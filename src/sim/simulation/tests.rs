@@ -1,3 +1,5 @@
+//! The whole step: rest, sag, contact, grab, and what must not depend on threads.
+
 use super::*;
 use crate::geom::SurfaceMesh;
 use crate::geom::lattice::{Lattice, block, sphere};
