@@ -17,31 +17,25 @@
 // Fails:   grazing views: the transmission is cut at 4 d, and N.V prefers the outer layer there.
 
 @fragment
-fn fragment(in: Varyings) -> @location(0) vec4f {
-    let at = place(in);
-    let shift = transmission(at.to_eye, at.detail, at.normal, frame.layer_distance_m);
-    let offset = vec2f(dot(shift.xyz, in.gradient_u), dot(shift.xyz, in.gradient_v));
-    let uv = in.uv + offset;
+fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    let pixel = pixel_at(at);
+    let gradients = gradients_of(textureLoad(detail_map, vec2i(at.xy), 0));
+    let shift = transmission(pixel.to_eye, pixel.relief, pixel.normal, frame.layer_distance_m);
+    let across = vec2f(dot(shift.xyz, pixel.tangent), dot(shift.xyz, pixel.bitangent));
+    let uv = pixel.uv + vec2f(dot(gradients.u, across), dot(gradients.v, across));
 
-    // The inner albedo blurs with the way through the outer layer.
-    let spread = 0.35 * shift.w * vec2f(length(in.gradient_u), length(in.gradient_v));
-    var inner = color_at(inner_map, uv + spread * vec2f(0.87, 0.5)).rgb;
-    inner += color_at(inner_map, uv + spread * vec2f(-0.87, 0.5)).rgb;
-    inner += color_at(inner_map, uv - spread * vec2f(0.0, 1.0)).rgb;
-    inner /= 3.0;
-
+    // The inner albedo blurs with the way through the outer layer: three taps about the place, none at it.
+    let spread = 0.35 * shift.w * vec2f(length(gradients.u), length(gradients.v));
+    let inner = (color_at(inner_map, uv + spread * vec2f(0.87, 0.5)).rgb
+        + color_at(inner_map, uv + spread * vec2f(-0.87, 0.5)).rgb
+        + color_at(inner_map, uv - spread * vec2f(0.0, 1.0)).rgb) / 3.0;
     let blurred = textureSampleLevel(light_map, linear_sampler, uv, 0.0);
     let inner_light = blurred.rgb / max(blurred.a, 1e-3);
 
-    let shadow = unshadowed(in.world, at.normal);
-    var outer_light = vec3f(0.05, 0.055, 0.06);
-    for (var k = 0u; k < frame.light_count; k += 1u) {
-        let lit = light_at(frame.lights[k], in.world);
-        let share = select(1.0, shadow, k == 0u);
-        outer_light += share * lit.irradiance * wrapped(dot(at.detail, lit.to_light), 0.0);
-    }
-    let opacity = clamp(at.outer.a * frame.outer_opacity, 0.0, 1.0);
-    let through = (1.0 - opacity) * max(dot(at.detail, at.to_eye), 0.0);
-    let color = mix(at.outer.rgb * outer_light, inner * inner_light, through) / PI;
-    return vec4f(color + wet(in, at, shadow), 1.0);
+    let through = way_through(pixel.world, pixel.normal);
+    let outer_light = diffuse(pixel.world, pixel.relief, vec3f(0.10, 0.05, 0.04), through);
+    let opacity = clamp(pixel.outer.a * frame.outer_opacity, 0.0, 1.0);
+    let n_v = max(dot(pixel.relief, pixel.to_eye), 0.0);
+    let color = mix(pixel.outer.rgb * outer_light, inner * inner_light, (1.0 - opacity) * n_v) / PI;
+    return vec4f(color + wet(pixel, unshadowed_after(through)), 1.0);
 }

@@ -10,8 +10,8 @@
 // Fails:   grazing views are cut at 4 layer distances.
 
 // From the surface to the inner layer [m], and the length of that way [m] in w. All in world space.
-fn transmission(to_eye: vec3f, detail: vec3f, normal: vec3f, distance: f32) -> vec4f {
-    let mirrored = reflect(-to_eye, detail);
+fn transmission(to_eye: vec3f, relief: vec3f, normal: vec3f, distance: f32) -> vec4f {
+    let mirrored = reflect(-to_eye, relief);
     let along = mirrored - 2.0 * dot(mirrored, normal) * normal;
     let down = abs(dot(along, normal));
     let way = distance / max(down, 0.25);

@@ -1,8 +1,8 @@
-// Lit tissue without scattering: wrapped diffuse light and a wet film.
+// Lit tissue without scattering: diffuse light and a wet film.
 //
-//   L = outer / pi  sum_l E_l wrapped(n.l) + wet film
+//   L = outer / pi  sum_l E_l max(n.l, 0) + wet film
 //
-// Source:  Lambert; Green 2004, 16.2.
+// Source:  Lambert; the film of shaders/film.wgsl.
 // Twin:    src/optics/film.rs, fn wrapped
 // Parity:  tests/shading_parity.rs, fn film_matches_the_cpu_twin
 // Threads: one a covered pixel.
@@ -10,14 +10,26 @@
 // Fails:   nothing of its own.
 
 @fragment
-fn fragment(in: Varyings) -> @location(0) vec4f {
-    let at = place(in);
-    let shadow = unshadowed(in.world, at.normal);
-    var diffuse = vec3f(0.06);
-    for (var k = 0u; k < frame.light_count; k += 1u) {
-        let lit = light_at(frame.lights[k], in.world);
-        let share = select(1.0, shadow, k == 0u);
-        diffuse += share * lit.irradiance * wrapped(dot(at.detail, lit.to_light), 0.0);
+fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    let pixel = pixel_at(at);
+    let unshadowed = unshadowed_after(way_through(pixel.world, pixel.normal));
+    var light = ambient(pixel.relief);
+    if LIGHT_COUNT > 0u {
+        light += unshadowed * lambert(0u, pixel);
     }
-    return vec4f(at.outer.rgb * diffuse / PI + wet(in, at, shadow), 1.0);
+    if LIGHT_COUNT > 1u {
+        light += lambert(1u, pixel);
+    }
+    if LIGHT_COUNT > 2u {
+        light += lambert(2u, pixel);
+    }
+    if LIGHT_COUNT > 3u {
+        light += lambert(3u, pixel);
+    }
+    return vec4f(pixel.outer.rgb * light / PI + wet(pixel, unshadowed), 1.0);
+}
+
+fn lambert(k: u32, pixel: Pixel) -> vec3f {
+    let lit = light_at(k, pixel.world);
+    return max(dot(pixel.relief, lit.to_light), 0.0) * lit.irradiance;
 }

@@ -1,205 +1,208 @@
-// Single scattering in layers of tissue, gathered along the view ray below the surface.
+// Layers of tissue: light scattered once, gathered along the view ray below the surface; light scattered more
+// often, as diffuse light; the wet film on top.
 //
-//   M(t)  = P - t w_out,  t = T (i/n)^2 (closed form) or T i/n (as published)
-//   plane = P's tangent plane at t = 0, the fitted plane at t = T, blended in between   François eq. 9
-//   s     = (h t/T - n_M . (M - P)) / (n_M . w_in)           signed; a plane that faces away is unlit
-//   (ds, dt) = (PM . g_u, PM . g_v)                          with the metric of the deformed surface
+//   M(t) = P - t w_out,  t = T (i/n)^2 (closed form) or T i/n (as published)
+//   T    = min(deepest layer / N.w_out, cap, exp(-8) of the clearest layer)
+//   (ds, dt) = (PM . g_u, PM . g_v)                        with the metric of the deformed surface
+//   L    = sum over lights and segments (medium.wgsl) + albedo diffuse / pi + film
 //
-// T is where the ray has sunk to the deepest layer or lost all but exp(-8). Each sample reads the layers
-// once; those of the light's way are the layers at M (their mean with K' changes little, and costs a fetch).
+// Each sample reads the layers once, for all lights; the light's way is split over the layers at M (their mean
+// with those at K' changes little and costs a fetch a light). The layers are tinted by the colour maps: the
+// upper two by the outer one, the lower two by the inner one.
 //
 // Source:  François 2006, Algorithms 1 and 2 with the faults mended that docs/METHODS.md lists; Norberg 2010,
-//          eqs. 10, 14, 5.1.
+//          eqs. 10, 14 and 5.1 (colour).
 // Twin:    src/optics/march.rs, fn march
 // Parity:  tests/shading_parity.rs, fn march_matches_the_cpu_twin
 // Threads: one a covered pixel.
 // Units:   metres, 1/m, W/(m2 sr).
-// Fails:   surfaces that fold below the patch radius; light that enters far from P.
+// Fails:   folds below the patch radius; light that enters far from P.
 
+override SAMPLES: u32 = 4u;
 override PUBLISHED: u32 = 0u;
-override LIGHTS: u32 = 2u;
 
+// What the march needs of a ray.
 struct Ray {
-    position: vec3f,
+    world: vec3f,
     normal: vec3f,
-    plane: vec4f,
+    plane: vec3f,
     to_eye: vec3f,
-    n_v: f32,
+    pair: PlanePair,
     uv: vec2f,
-    gradient_u: vec3f,
-    gradient_v: vec3f,
+    // Texture coordinates a metre along the ray.
+    drift: vec2f,
 }
 
-fn bottoms_at(ray: Ray, offset: vec3f) -> vec4f {
-    let uv = ray.uv + vec2f(dot(offset, ray.gradient_u), dot(offset, ray.gradient_v));
-    return frame.layer_depth_max_m * textureSampleLevel(layer_map, linear_sampler, uv, 0.0);
-}
-
-// Optical depth from a light to a point that lies `below` the plane [m]; beyond any eye's reach where the
-// plane faces away.
-fn depth_to_light(below: f32, cosine: f32, bottoms: vec4f, sigma_t: mat4x3f) -> vec3f {
-    let c = max(cosine, 1e-3);
-    let depth = optical_depth(max(below, 0.0) / c, c, bottoms, sigma_t);
-    return select(depth, vec3f(60.0), cosine <= 1e-3);
-}
-
-// One light along the march. Each has a variable of its own: a list that is stepped through by a counter lies in
-// memory on software adapters, and costs three times as much.
+// One light on its way along the ray: its cosines with both planes, its optical depth at the last sample.
 struct Beam {
-    to_light: vec3f,
+    facing: vec2f,
     irradiance: vec3f,
-    // Phase function of each layer between this light and the eye.
-    phases: vec4f,
-    // Optical depth from light to eye by way of the last node, and exp of its negative.
+    sources: Layers,
     depth: vec3f,
-    transmittance: vec3f,
 }
 
-// What all lights share at a node.
-struct Node {
-    // Unit normal of the plane, and how far below it the node lies [m].
-    normal: vec3f,
-    below: f32,
-    bottoms: vec4f,
-    // How much of the step that ends here each layer fills.
-    content: vec4f,
-    eye_depth: vec3f,
-    step: f32,
+fn bottoms_at(ray: Ray, t: f32) -> vec3f {
+    let texel = textureSampleLevel(layer_map, linear_sampler, ray.uv + t * ray.drift, 0.0);
+    return frame.layer_depth_max_m * texel.rgb;
 }
 
-fn beam(ray: Ray, index: u32, share: f32, bottoms: vec4f, sigma_t: mat4x3f) -> Beam {
-    let lit = light_at(frame.lights[index], ray.position);
-    let cosine = dot(lit.to_light, ray.to_eye);
-    let phases = vec4f(
-        phase(cosine, frame.scattering[0].w),
-        phase(cosine, frame.scattering[1].w),
-        phase(cosine, frame.scattering[2].w),
-        phase(cosine, frame.scattering[3].w),
-    );
-    let depth = depth_to_light(0.0, dot(ray.normal, lit.to_light), bottoms, sigma_t);
-    return Beam(lit.to_light, share * lit.irradiance, phases, depth, exp(-depth));
-}
-
-// Light that the step which ends at `node` sends to the eye.
-fn gather(beam: ptr<function, Beam>, node: Node, sigma_t: mat4x3f, sigma_s: mat4x3f) -> vec3f {
-    let cosine = dot(node.normal, (*beam).to_light);
-    let depth = node.eye_depth + depth_to_light(node.below, cosine, node.bottoms, sigma_t);
-    let transmittance = exp(-depth);
-    var mean = (*beam).transmittance;
-    if PUBLISHED == 0u {
-        mean = piece((*beam).depth, depth, (*beam).transmittance, transmittance);
-    }
-    let emitted = sigma_s * (node.content * (*beam).phases);
-    (*beam).depth = depth;
-    (*beam).transmittance = transmittance;
-    return node.step * (*beam).irradiance * emitted * mean;
-}
-
-// Radiance [W/(m2 sr)] scattered once towards the eye; `shares` is how much of each light arrives.
-fn single_scattering(ray: Ray, shares: vec4f, bottoms_p: vec4f) -> vec3f {
-    let sigma_t = mat4x3f(
+fn extinctions() -> Layers {
+    return Layers(
         frame.extinction[0].xyz,
         frame.extinction[1].xyz,
         frame.extinction[2].xyz,
         frame.extinction[3].xyz,
     );
-    let sigma_s = mat4x3f(
-        frame.scattering[0].xyz,
-        frame.scattering[1].xyz,
-        frame.scattering[2].xyz,
-        frame.scattering[3].xyz,
-    );
-    var beam_0 = beam(ray, 0u, shares.x, bottoms_p, sigma_t);
-    var beam_1: Beam;
-    var beam_2: Beam;
-    var beam_3: Beam;
-    if LIGHTS > 1u {
-        beam_1 = beam(ray, 1u, shares.y, bottoms_p, sigma_t);
-    }
-    if LIGHTS > 2u {
-        beam_2 = beam(ray, 2u, shares.z, bottoms_p, sigma_t);
-    }
-    if LIGHTS > 3u {
-        beam_3 = beam(ray, 3u, shares.w, bottoms_p, sigma_t);
-    }
-    let clearest = min(min(sigma_t[1].x, sigma_t[1].y), sigma_t[1].z);
-    let reach = min(frame.layer_depth_max_m / ray.n_v, 8.0 / clearest);
-    var sum = vec3f(0.0);
-    var eye_depth = vec3f(0.0);
-    var bottoms = bottoms_p;
-    var t = 0.0;
-    for (var i = 1u; i <= SAMPLES; i += 1u) {
-        let share = f32(i) / f32(SAMPLES);
-        let next = reach * select(share * share, share, PUBLISHED != 0u);
-        let step = next - t;
-        let offset = -next * ray.to_eye;
-        let blend = next / reach;
-        let bottoms_next = bottoms_at(ray, offset);
-        let n = normalize(mix(ray.normal, ray.plane.xyz, blend));
-        var content = filled(t * ray.n_v, next * ray.n_v, 0.5 * (bottoms + bottoms_next));
-        if PUBLISHED != 0u {
-            // The layer at the start of the step stands for all of it.
-            let layer = layer_at(t * ray.n_v, bottoms);
-            content = vec4f(vec4u(layer) == vec4u(0u, 1u, 2u, 3u));
-        }
-        eye_depth += step * (sigma_t * content);
-        let below = blend * ray.plane.w - dot(n, offset);
-        let node = Node(n, below, bottoms_next, content, eye_depth, step);
-        sum += gather(&beam_0, node, sigma_t, sigma_s);
-        if LIGHTS > 1u {
-            sum += gather(&beam_1, node, sigma_t, sigma_s);
-        }
-        if LIGHTS > 2u {
-            sum += gather(&beam_2, node, sigma_t, sigma_s);
-        }
-        if LIGHTS > 3u {
-            sum += gather(&beam_3, node, sigma_t, sigma_s);
-        }
-        t = next;
-        bottoms = bottoms_next;
-    }
-    return sum;
 }
 
-@fragment
-fn fragment(in: Varyings) -> @location(0) vec4f {
-    let at = place(in);
-    // The parallax of what shines through: the deep colour is read where the refracted ray meets it.
-    let ray = Ray(
-        in.world,
-        at.normal,
-        vec4f(normalize(in.plane.xyz), in.plane.w),
-        at.to_eye,
-        max(at.n_v, 0.12),
-        in.uv,
-        in.gradient_u,
-        in.gradient_v,
-    );
-    let bottoms = bottoms_at(ray, vec3f(0.0));
-    let sunk = -(0.35 * frame.layer_depth_max_m / max(at.n_v, 0.35)) * at.to_eye;
-    let deep_uv = in.uv + vec2f(dot(sunk, in.gradient_u), dot(sunk, in.gradient_v));
-    let deep = color_at(inner_map, deep_uv).rgb;
-    let shadow = unshadowed(in.world, at.normal);
+fn beam_start(k: u32, ray: Ray) -> Beam {
+    return beam_at(k, ray, 0.0, 0.0, vec3f(0.0), extinctions());
+}
 
-    // Only the first light casts shadows.
-    let shares = vec4f(shadow, 1.0, 1.0, 1.0);
-    var diffuse = vec3f(0.05, 0.055, 0.06);
-    for (var k = 0u; k < LIGHTS; k += 1u) {
-        let lit = light_at(frame.lights[k], in.world);
-        let share = select(1.0, shadow, k == 0u);
-        // Red light wanders farthest, so it reaches farthest round the terminator.
-        let soft = mix(at.detail, at.normal, 0.5);
-        let cosine = dot(soft, lit.to_light);
-        let reach = frame.wrap * vec3f(1.0, 0.45, 0.3);
-        diffuse += mix(0.25, 1.0, share) * lit.irradiance * vec3f(
-            wrapped(cosine, reach.x),
-            wrapped(cosine, reach.y),
-            wrapped(cosine, reach.z),
-        );
+fn beam_at(k: u32, ray: Ray, t: f32, blend: f32, bottoms: vec3f, layers: Layers) -> Beam {
+    let lit = light_at(k, ray.world - t * ray.to_eye);
+    let facing = vec2f(dot(ray.normal, lit.to_light), dot(ray.plane, lit.to_light));
+    let p = phases(dot(lit.to_light, ray.to_eye), vec4f(
+        frame.extinction[0].w,
+        frame.extinction[1].w,
+        frame.extinction[2].w,
+        frame.extinction[3].w,
+    ));
+    let sources = Layers(
+        p.x * frame.albedo[0].xyz,
+        p.y * frame.albedo[1].xyz,
+        p.z * frame.albedo[2].xyz,
+        p.w * frame.albedo[3].xyz,
+    );
+    let way = way_to_light(ray.pair, t, blend, facing.x, facing.y);
+    return Beam(facing, lit.irradiance, sources, light_depth(way, bottoms, layers));
+}
+
+// Beyond any eye's reach where the plane faces away.
+fn light_depth(way: vec2f, bottoms: vec3f, layers: Layers) -> vec3f {
+    return select(vec3f(60.0), optical_depth(way.x, way.y, bottoms, layers), way.y > 0.0);
+}
+
+struct Step {
+    t: f32,
+    blend: f32,
+    bottoms: vec3f,
+    segment: Segment,
+    // How far the start of the segment lies below each boundary [m].
+    below: vec3f,
+}
+
+// Moves a beam to the end of a step and returns what the step sends to the eye.
+fn advance(k: u32, ray: Ray, step: Step, layers: Layers, beam: ptr<function, Beam>) -> Gathered {
+    let last = *beam;
+    if (POINT_LIGHTS & (1u << k)) != 0u {
+        *beam = beam_at(k, ray, step.t, step.blend, step.bottoms, layers);
+    } else {
+        let way = way_to_light(ray.pair, step.t, step.blend, last.facing.x, last.facing.y);
+        (*beam).depth = light_depth(way, step.bottoms, layers);
     }
-    let single = single_scattering(ray, shares, bottoms);
-    let color = mix(deep, at.outer.rgb, at.outer.a);
-    let tint = mix(vec3f(1.0), 2.2 * color, frame.color_blend);
-    let scattered = tint * single + frame.multiple_scattering * color * diffuse / PI;
-    return vec4f(scattered + wet(in, at, shadow), 1.0);
+    var got = gather(step.segment, last.depth, (*beam).depth, last.sources);
+    if PUBLISHED != 0u {
+        got = gather_at_start(step.segment, last.depth, step.below, last.sources);
+    }
+    return Gathered(got.upper * last.irradiance, got.lower * last.irradiance);
+}
+
+fn single_scattering(ray: Ray, unshadowed: f32) -> Gathered {
+    let layers = extinctions();
+    let n_v = max(ray.pair.tangent_eye, 1e-3);
+    let reach = min(frame.layer_depth_max_m / max(n_v, 0.125), frame.reach_m);
+    var beam0 = beam_start(0u, ray);
+    beam0.irradiance *= unshadowed;
+    var beam1: Beam;
+    var beam2: Beam;
+    var beam3: Beam;
+    if LIGHT_COUNT > 1u {
+        beam1 = beam_start(1u, ray);
+    }
+    if LIGHT_COUNT > 2u {
+        beam2 = beam_start(2u, ray);
+    }
+    if LIGHT_COUNT > 3u {
+        beam3 = beam_start(3u, ray);
+    }
+    var upper = vec3f(0.0);
+    var lower = vec3f(0.0);
+    var t = 0.0;
+    var a = vec3f(0.0);
+    var below = -bottoms_at(ray, 0.0);
+    for (var i = 1u; i <= SAMPLES; i += 1u) {
+        let even = f32(i) * (1.0 / f32(SAMPLES));
+        let share = select(even * even, even, PUBLISHED != 0u);
+        let next = reach * share;
+        let bottoms = bottoms_at(ray, next);
+        let below_next = next * n_v - bottoms;
+        var shares = above(below, below_next);
+        if PUBLISHED != 0u {
+            shares = select(vec3f(1.0), vec3f(0.0), below > vec3f(0.0));
+        }
+        let blend = select(share * share, share, PUBLISHED != 0u);
+        let step = Step(next, blend, bottoms, segment(a, next - t, shares, layers), below);
+        var got = advance(0u, ray, step, layers, &beam0);
+        upper += got.upper;
+        lower += got.lower;
+        if LIGHT_COUNT > 1u {
+            got = advance(1u, ray, step, layers, &beam1);
+            upper += got.upper;
+            lower += got.lower;
+        }
+        if LIGHT_COUNT > 2u {
+            got = advance(2u, ray, step, layers, &beam2);
+            upper += got.upper;
+            lower += got.lower;
+        }
+        if LIGHT_COUNT > 3u {
+            got = advance(3u, ray, step, layers, &beam3);
+            upper += got.upper;
+            lower += got.lower;
+        }
+        t = next;
+        a = step.segment.a4;
+        below = below_next;
+    }
+    return Gathered(upper, lower);
+}
+
+// A colour map leaves a layer as it is where it is this bright.
+const NEUTRAL_COLOR: f32 = 0.18;
+
+@fragment
+fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    let pixel = pixel_at(at);
+    let detail = textureLoad(detail_map, vec2i(at.xy), 0);
+    let gradients = gradients_of(detail);
+    let plane = from_octahedral(detail.x);
+    let drift = -vec2f(dot(gradients.u, pixel.across), dot(gradients.v, pixel.across));
+    let pair = PlanePair(
+        dot(pixel.normal, plane),
+        dot(pixel.normal, pixel.to_eye),
+        dot(plane, pixel.to_eye),
+        bitcast<f32>(detail.y),
+    );
+    let ray = Ray(pixel.world, pixel.normal, plane, pixel.to_eye, pair, pixel.uv, drift);
+
+    // What lies deep is seen where the ray meets it: that shift is the parallax of the vessels.
+    let sunk = 0.35 * frame.layer_depth_max_m / max(pair.tangent_eye, 0.35);
+    let deep = color_at(inner_map, pixel.uv + sunk * drift).rgb;
+    let through = way_through(pixel.world, pixel.normal);
+    let unshadowed = unshadowed_after(through);
+
+    var radiance = wet(pixel, unshadowed);
+    if LIGHT_COUNT > 0u {
+        let single = single_scattering(ray, unshadowed);
+        let neutral = vec3f(1.0);
+        radiance += single.upper * mix(neutral, pixel.outer.rgb / NEUTRAL_COLOR, frame.color_blend)
+            + single.lower * mix(neutral, deep / NEUTRAL_COLOR, frame.color_blend);
+    }
+    // Red wanders farthest, so its light is softest and reaches farthest round the terminator.
+    let soft = normalize(pixel.relief + pixel.normal);
+    let wrap = frame.wrap * vec3f(1.0, 0.42, 0.30);
+    let color = mix(deep, pixel.outer.rgb, pixel.outer.a);
+    radiance += frame.multiple_scattering * color * diffuse(pixel.world, soft, wrap, through) / PI;
+    return vec4f(radiance, 1.0);
 }

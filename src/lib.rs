@@ -15,6 +15,7 @@ pub mod app;
 pub mod geom;
 pub mod gpu;
 pub mod measure;
+pub mod optics;
 pub mod passes;
 pub mod scene;
 pub mod sim;

@@ -157,7 +157,10 @@ impl Renderer {
     ///
     /// [`AppError::Gpu`] if it can't be read back.
     pub fn depth(&self) -> Result<Vec<f32>, AppError> {
-        Ok(read_texture_depth(&self.gpu, &self.passes.depth.texture)?)
+        Ok(read_texture_depth(
+            &self.gpu,
+            &self.passes.targets.depth.texture,
+        )?)
     }
 
     /// Normals a point, tangents a vertex, planes a point (none for the tangent plane).

@@ -17,6 +17,8 @@ pub enum Binding<'a> {
     Unfiltered(&'a wgpu::TextureView),
     /// `texture_2d<u32>`
     Integers(&'a wgpu::TextureView),
+    /// `texture_2d<u32>`
+    Words(&'a wgpu::TextureView),
     /// `texture_depth_2d`
     Depth(&'a wgpu::TextureView),
     /// `texture_storage_2d<…, write>` of the format given
@@ -46,6 +48,7 @@ impl<'a> Binding<'a> {
             Self::Texture(_) => texture(wgpu::TextureSampleType::Float { filterable: true }),
             Self::Unfiltered(_) => texture(wgpu::TextureSampleType::Float { filterable: false }),
             Self::Integers(_) => texture(wgpu::TextureSampleType::Uint),
+            Self::Words(_) => texture(wgpu::TextureSampleType::Uint),
             Self::Depth(_) => texture(wgpu::TextureSampleType::Depth),
             Self::Image(_, format) => wgpu::BindingType::StorageTexture {
                 access: wgpu::StorageTextureAccess::WriteOnly,
@@ -64,6 +67,7 @@ impl<'a> Binding<'a> {
             }
             Self::Texture(view)
             | Self::Unfiltered(view)
+            | Self::Words(view)
             | Self::Integers(view)
             | Self::Depth(view)
             | Self::Image(view, _) => wgpu::BindingResource::TextureView(view),

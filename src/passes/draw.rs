@@ -18,14 +18,27 @@ pub struct DrawKind<'a> {
     pub source: &'a str,
     /// Vertex entry point.
     pub vertex: &'a str,
-    /// Fragment entry point and the format it draws to; none for depth alone.
-    pub fragment: Option<(&'a str, wgpu::TextureFormat)>,
-    /// Format of the depth target, if there is one.
-    pub depth: Option<wgpu::TextureFormat>,
+    /// Fragment entry point and the formats it draws to; none for depth alone.
+    pub fragment: Option<(&'a str, &'a [wgpu::TextureFormat])>,
+    /// How it is blended with what is there; left out, it replaces it.
+    pub blend: Option<wgpu::BlendState>,
+    /// What it does with the depth target.
+    pub depth: DepthUse,
     /// Which side of a triangle is not drawn.
     pub cull: Option<wgpu::Face>,
     /// Values of the `override`s.
     pub constants: &'a [(&'a str, f64)],
+}
+
+/// What a [`Draw`] does with a depth target of [`super::DEPTH_FORMAT`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DepthUse {
+    /// There is none.
+    None,
+    /// Keeps what is nearest.
+    Nearest,
+    /// Reads it: a draw at the far end passes where something lies before it.
+    Covered,
 }
 
 impl Draw {
@@ -54,41 +67,55 @@ impl Draw {
             constants: kind.constants,
             ..Default::default()
         };
-        let targets = kind.fragment.map(|(_, format)| [Some(format.into())]);
-        let pipeline =
-            gpu.device
-                .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                    label: Some(kind.pass),
-                    layout: Some(&pipeline_layout),
-                    vertex: wgpu::VertexState {
-                        module: &module,
-                        entry_point: Some(kind.vertex),
-                        compilation_options: options.clone(),
-                        buffers: &[],
-                    },
-                    primitive: wgpu::PrimitiveState {
-                        cull_mode: kind.cull,
-                        ..Default::default()
-                    },
-                    depth_stencil: kind.depth.map(|format| wgpu::DepthStencilState {
-                        format,
-                        depth_write_enabled: Some(true),
-                        depth_compare: Some(wgpu::CompareFunction::Less),
-                        stencil: wgpu::StencilState::default(),
-                        bias: wgpu::DepthBiasState::default(),
-                    }),
-                    multisample: wgpu::MultisampleState::default(),
-                    fragment: kind.fragment.zip(targets.as_ref()).map(
-                        |((entry_point, _), targets)| wgpu::FragmentState {
-                            module: &module,
-                            entry_point: Some(entry_point),
-                            compilation_options: options.clone(),
-                            targets,
-                        },
-                    ),
-                    multiview_mask: None,
-                    cache: None,
-                });
+        let targets: Vec<_> = kind
+            .fragment
+            .iter()
+            .flat_map(|(_, formats)| formats.iter())
+            .map(|&format| {
+                Some(wgpu::ColorTargetState {
+                    format,
+                    blend: kind.blend,
+                    write_mask: wgpu::ColorWrites::ALL,
+                })
+            })
+            .collect();
+        let depth_test = match kind.depth {
+            DepthUse::None => None,
+            DepthUse::Nearest => Some((true, wgpu::CompareFunction::Less)),
+            DepthUse::Covered => Some((false, wgpu::CompareFunction::Greater)),
+        };
+        let pipeline = gpu
+            .device
+            .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(kind.pass),
+                layout: Some(&pipeline_layout),
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some(kind.vertex),
+                    compilation_options: options.clone(),
+                    buffers: &[],
+                },
+                primitive: wgpu::PrimitiveState {
+                    cull_mode: kind.cull,
+                    ..Default::default()
+                },
+                depth_stencil: depth_test.map(|(write, compare)| wgpu::DepthStencilState {
+                    format: super::DEPTH_FORMAT,
+                    depth_write_enabled: Some(write),
+                    depth_compare: Some(compare),
+                    stencil: wgpu::StencilState::default(),
+                    bias: wgpu::DepthBiasState::default(),
+                }),
+                multisample: wgpu::MultisampleState::default(),
+                fragment: kind.fragment.map(|(entry_point, _)| wgpu::FragmentState {
+                    module: &module,
+                    entry_point: Some(entry_point),
+                    compilation_options: options.clone(),
+                    targets: &targets,
+                }),
+                multiview_mask: None,
+                cache: None,
+            });
         match pollster::block_on(scope.pop()) {
             None => Ok(Self {
                 pipeline,
@@ -99,6 +126,11 @@ impl Draw {
                 message: error.to_string(),
             }),
         }
+    }
+
+    /// Binds other things in place of those given to [`Draw::new`], of the same kinds.
+    pub fn rebind(&mut self, gpu: &Gpu, label: &str, bindings: &[Binding<'_>]) {
+        (_, self.bindings) = bind(gpu, label, wgpu::ShaderStages::VERTEX_FRAGMENT, bindings);
     }
 
     /// Makes `pass` use this pipeline and its bindings.
@@ -141,30 +173,45 @@ impl Target {
     }
 }
 
+impl Target {
+    /// Width and height [px].
+    pub fn size(&self) -> [u32; 2] {
+        [self.texture.width(), self.texture.height()]
+    }
+}
+
 /// A colour attachment that is cleared to nothing.
 pub fn cleared(view: &wgpu::TextureView) -> Option<wgpu::RenderPassColorAttachment<'_>> {
+    attachment(view, wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT))
+}
+
+/// A colour attachment that is drawn over as it is.
+pub fn kept(view: &wgpu::TextureView) -> Option<wgpu::RenderPassColorAttachment<'_>> {
+    attachment(view, wgpu::LoadOp::Load)
+}
+
+fn attachment(
+    view: &wgpu::TextureView,
+    load: wgpu::LoadOp<wgpu::Color>,
+) -> Option<wgpu::RenderPassColorAttachment<'_>> {
     Some(wgpu::RenderPassColorAttachment {
         view,
         depth_slice: None,
         resolve_target: None,
         ops: wgpu::Operations {
-            load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+            load,
             store: wgpu::StoreOp::Store,
         },
     })
 }
 
-/// A colour attachment that keeps what it holds.
-pub fn kept(view: &wgpu::TextureView) -> Option<wgpu::RenderPassColorAttachment<'_>> {
-    Some(wgpu::RenderPassColorAttachment {
+/// A depth attachment that is read only, so that it can be bound as a texture too.
+pub fn read_depth(view: &wgpu::TextureView) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
         view,
-        depth_slice: None,
-        resolve_target: None,
-        ops: wgpu::Operations {
-            load: wgpu::LoadOp::Load,
-            store: wgpu::StoreOp::Store,
-        },
-    })
+        depth_ops: None,
+        stencil_ops: None,
+    }
 }
 
 /// A depth attachment that is cleared to the far end.

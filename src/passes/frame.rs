@@ -1,6 +1,7 @@
 //! The passes of a scene, and one frame of them in order.
 
 use super::draw::Target;
+use super::geometry::{Geometry, GeometryTargets};
 use super::light_path::{LightPath, RefitCounts};
 use super::lightmap::{LightMap, uv_per_m};
 use super::maps::Maps;
@@ -9,11 +10,11 @@ use super::plane_carried::PlaneCarried;
 use super::plane_full::PlaneFull;
 use super::plane_incremental::PlaneIncremental;
 use super::shadow::Shadow;
-use super::surface::{NoShadow, Surface, SurfaceInputs, shadow_inputs};
+use super::surface::{Surface, SurfaceInputs};
 use super::tangents::Tangents;
-use super::tonemap::{PartPx, ToneMap};
+use super::tonemap::ToneMap;
 use super::tools::{DrawnTool, Tools, ToolsView};
-use super::view::{FrameUniform, View, placed_lights, shadow_from_world};
+use super::view::{FrameUniform, View, light_constants, placed_lights, shadow_from_world};
 use super::{DEPTH_FORMAT, PICTURE_FORMAT, RADIANCE_FORMAT};
 use crate::geom::SurfaceMesh;
 use crate::geom::paint::TissueMaps;
@@ -21,7 +22,7 @@ use crate::geom::patch::radius_from_extinction_m;
 use crate::geom::plane::LightPathMethod;
 use crate::gpu::{Gpu, GpuError, Timer, uniform};
 use crate::scene::{PlacedLight, RestBox, Scene, SurfaceKind, SurfaceSection};
-use glam::{Mat4, Vec2, Vec3};
+use glam::{Mat4, Vec3};
 
 /// Light that is left at the radius of a patch: ε of François 2006, section 2.2.
 const PATCH_EPSILON: f32 = 0.01;
@@ -59,6 +60,7 @@ impl FramePlan {
             (Shadow::NAME, 1, shadow),
             (LightMap::NAME, 1, gooey),
             (LightMap::BLUR_NAME, blurs, gooey && blurs > 0),
+            (Geometry::NAME, 1, true),
             ("plain", 1, kind == SurfaceKind::Plain),
             ("subsurface", 1, kind == SurfaceKind::Subsurface),
             ("gooey", 1, gooey),
@@ -103,13 +105,17 @@ pub struct FramePasses {
     pub light_path: LightPath,
     /// Linear radiance, coverage in alpha.
     pub radiance: Target,
-    /// Depth, 0 near to 1 far.
-    pub depth: Target,
+    /// What lies at each pixel, and its depth.
+    pub targets: GeometryTargets,
     /// What is shown.
     pub picture: Target,
     shadow: Option<Shadow>,
     light_map: Option<LightMap>,
+    geometry: Geometry,
     surface: Surface,
+    maps: Maps,
+    /// Stands for the shadow map where there is none; never read.
+    no_shadow: Target,
     tools: Tools,
     tone_map: ToneMap,
     frame: wgpu::Buffer,
@@ -169,56 +175,56 @@ impl FramePasses {
         let frame = uniform(
             gpu,
             "frame",
-            &FrameUniform::new(
-                &view,
-                size,
-                &lights,
-                &scene.surface,
-                Mat4::IDENTITY,
-                uv_per_m,
-                tissue.size_px,
-            ),
+            &FrameUniform::new(&view, size, &lights, &scene.surface, Mat4::IDENTITY, 1.0),
         );
+        let constants = light_constants(&lights);
         let maps = Maps::new(gpu, tissue);
-        let nothing = NoShadow::new(gpu);
-        let (shadow_view, shadow_sampler) = shadow_inputs(shadow.as_ref(), &nothing);
-        let inputs = SurfaceInputs {
-            frame: &frame,
-            mesh: &mesh,
-            tangents: &tangents,
-            maps: &maps,
-            planes: light_path.planes().unwrap_or(&tangents.normals),
-            has_planes: light_path.planes().is_some(),
-            shadow_view,
-            shadow_sampler,
-            has_shadow: shadow.is_some(),
-            light_count: lights.len(),
-        };
+        let no_shadow = Target::new(gpu, "no shadow", [1; 2], DEPTH_FORMAT);
+        let shadow_map = shadow.as_ref().map_or(&no_shadow, |shadow| &shadow.target);
         let light_map = if scene.surface.kind == SurfaceKind::Gooey {
             Some(LightMap::new(
                 gpu,
                 scene.surface.light_map_size_px,
                 scene.surface.blur_passes,
-                &inputs,
+                &frame,
+                &constants,
+                &mesh,
+                &tangents,
+                &shadow_map.view,
             )?)
         } else {
             None
         };
-        let light_map_view = light_map.as_ref().map_or(&maps.outer, LightMap::view);
-        let surface = Surface::new(gpu, &scene.surface, &inputs, light_map_view)?;
-        let (radiance, depth, picture) = targets(gpu, size);
+        let geometry = Geometry::new(gpu, &frame, &mesh, &tangents, light_path.planes())?;
+        let targets = GeometryTargets::new(gpu, size);
+        let surface = Surface::new(
+            gpu,
+            &scene.surface,
+            &SurfaceInputs {
+                frame: &frame,
+                light_constants: &constants,
+                geometry: &targets,
+                maps: &maps,
+                light_map: light_map.as_ref().map_or(&maps.outer, LightMap::view),
+                shadow_map: &shadow_map.view,
+            },
+        )?;
+        let radiance = Target::new(gpu, "radiance", size, RADIANCE_FORMAT);
         Ok(Self {
             tools: Tools::new(gpu, RADIANCE_FORMAT, DEPTH_FORMAT)?,
-            tone_map: ToneMap::new(gpu, &radiance)?,
+            tone_map: ToneMap::new(gpu, &radiance, &targets.depth)?,
+            picture: Target::new(gpu, "picture", size, PICTURE_FORMAT),
             mesh,
             tangents,
             light_path,
             radiance,
-            depth,
-            picture,
+            targets,
             shadow,
             light_map,
+            geometry,
             surface,
+            maps,
+            no_shadow,
             frame,
             lights,
             knobs: scene.surface.clone(),
@@ -239,8 +245,25 @@ impl FramePasses {
     ///
     /// [`GpuError`] if the adapter refuses the pass that reads it.
     pub fn resize(&mut self, gpu: &Gpu, size: [u32; 2]) -> Result<(), GpuError> {
-        (self.radiance, self.depth, self.picture) = targets(gpu, size);
-        self.tone_map = ToneMap::new(gpu, &self.radiance)?;
+        self.radiance = Target::new(gpu, "radiance", size, RADIANCE_FORMAT);
+        self.picture = Target::new(gpu, "picture", size, PICTURE_FORMAT);
+        self.targets = GeometryTargets::new(gpu, size);
+        let shadow_map = self.shadow.as_ref().map_or(&self.no_shadow, |s| &s.target);
+        self.surface.rebind(
+            gpu,
+            &SurfaceInputs {
+                frame: &self.frame,
+                light_constants: &light_constants(&self.lights),
+                geometry: &self.targets,
+                maps: &self.maps,
+                light_map: self
+                    .light_map
+                    .as_ref()
+                    .map_or(&self.maps.outer, LightMap::view),
+                shadow_map: &shadow_map.view,
+            },
+        );
+        self.tone_map = ToneMap::new(gpu, &self.radiance, &self.targets.depth)?;
         self.size = size;
         Ok(())
     }
@@ -270,8 +293,7 @@ impl FramePasses {
             &self.lights,
             &self.knobs,
             shadow_from_world,
-            self.uv_per_m,
-            self.map_size_px,
+            self.uv_per_m * self.map_size_px as f32,
         );
         gpu.queue
             .write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
@@ -290,9 +312,12 @@ impl FramePasses {
             let radius = self.knobs.blur_radius_m * self.uv_per_m;
             light_map.record(gpu, radius, &self.mesh, encoder, timer);
         }
+        // What lies at each pixel.
+        self.geometry
+            .record(&self.mesh, &self.targets, encoder, timer);
         // The one surface model of the scene.
         self.surface
-            .record(&self.mesh, &self.radiance, &self.depth, encoder, timer);
+            .record(&self.radiance, &self.targets.depth, encoder, timer);
         // What prods it.
         let tools_view = ToolsView {
             clip_from_world: frame.clip_from_world,
@@ -303,16 +328,15 @@ impl FramePasses {
             &tools_view,
             tools,
             &self.radiance.view,
-            &self.depth.view,
+            &self.targets.depth.view,
             encoder,
             timer,
         );
-        // Exposure, tone curve, sRGB; only where something was drawn.
-        let part = drawn_part(points, tools, view, self.size);
+        // Exposure, tone curve, sRGB, backdrop.
         self.tone_map.record(
             gpu,
             self.knobs.exposure,
-            part,
+            &self.targets.depth,
             &self.picture,
             encoder,
             timer,
@@ -327,46 +351,6 @@ impl FramePasses {
     pub fn refit_counts(&self, gpu: &Gpu) -> Result<RefitCounts, GpuError> {
         self.light_path.counts(gpu)
     }
-}
-
-/// The part of the picture that surface and tools can cover, with a margin for the smoothed outline.
-fn drawn_part(points: &[Vec3], tools: &[DrawnTool], view: &View, size: [u32; 2]) -> PartPx {
-    let [width, height] = size.map(|px| px as f32);
-    let clip_from_world = view.clip_from_world(width / height);
-    let view_from_world = view.view_from_world();
-    let scale = height / (2.0 * (0.5 * view.fov_y).tan());
-    let ends = tools
-        .iter()
-        .flat_map(|tool| [tool.tip_m, tool.tip_m + tool.axis_m].map(|end| (end, tool.radius_m)));
-    let (mut low, mut high) = (Vec2::splat(f32::INFINITY), Vec2::splat(f32::NEG_INFINITY));
-    for (place, radius_m) in points.iter().map(|&p| (p, 0.0)).chain(ends) {
-        let distance_m = -view_from_world.transform_point3(place).z;
-        if distance_m <= 1.1 * radius_m {
-            // At or behind the eye a place has no pixel.
-            return [0, 0, size[0], size[1]];
-        }
-        let clip = clip_from_world.project_point3(place);
-        let at = Vec2::new(0.5 * (1.0 + clip.x) * width, 0.5 * (1.0 - clip.y) * height);
-        let reach = Vec2::splat(1.2 * radius_m * scale / (distance_m - radius_m) + 2.0);
-        low = low.min(at - reach);
-        high = high.max(at + reach);
-    }
-    let low = low.floor().clamp(Vec2::ZERO, Vec2::new(width, height));
-    let high = high.ceil().clamp(low, Vec2::new(width, height));
-    [
-        low.x as u32,
-        low.y as u32,
-        (high.x - low.x) as u32,
-        (high.y - low.y) as u32,
-    ]
-}
-
-fn targets(gpu: &Gpu, size: [u32; 2]) -> (Target, Target, Target) {
-    (
-        Target::new(gpu, "radiance", size, RADIANCE_FORMAT),
-        Target::new(gpu, "depth", size, DEPTH_FORMAT),
-        Target::new(gpu, "picture", size, PICTURE_FORMAT),
-    )
 }
 
 #[cfg(test)]
@@ -390,36 +374,6 @@ mod tests {
         let plan = plan("[surface]\nkind = \"plain\"");
         assert_eq!(names(&plan), ["tangents", "plain", "tonemap"]);
         assert!(plan.left_out.contains(&"planes-incremental"));
-    }
-
-    #[test]
-    fn everything_that_is_drawn_lies_in_the_part_that_is_shown() {
-        let view = View {
-            eye: Vec3::new(0.0, 0.0, 1.0),
-            target: Vec3::ZERO,
-            fov_y: 0.6,
-        };
-        let points = [Vec3::new(-0.1, 0.0, 0.0), Vec3::new(0.05, 0.1, 0.1)];
-        let tool = DrawnTool {
-            tip_m: Vec3::new(0.15, -0.1, 0.0),
-            axis_m: Vec3::ZERO,
-            radius_m: 0.05,
-        };
-        let [left, top, width, height] = drawn_part(&points, &[tool], &view, [400, 300]);
-        let clip_from_world = view.clip_from_world(4.0 / 3.0);
-        let rim = (0..64).map(|k| {
-            let (sin, cos) = (k as f32 * 0.1).sin_cos();
-            tool.tip_m + tool.radius_m * Vec3::new(cos, sin, 0.0)
-        });
-        for place in points.into_iter().chain(rim) {
-            let clip = clip_from_world.project_point3(place);
-            let (x, y) = (200.0 * (1.0 + clip.x), 150.0 * (1.0 - clip.y));
-            assert!((left as f32..(left + width) as f32).contains(&x), "{place}");
-            assert!((top as f32..(top + height) as f32).contains(&y), "{place}");
-        }
-        assert!(width < 400 && height < 300, "{width} x {height} is no part");
-        let behind = drawn_part(&[Vec3::new(0.0, 0.0, 2.0)], &[], &view, [400, 300]);
-        assert_eq!(behind, [0, 0, 400, 300]);
     }
 
     #[test]

@@ -1,13 +1,17 @@
 //! The light map of the gooey surface: drawn in texture space, then blurred.
 
-use super::draw::{Draw, DrawKind, Target, cleared};
+use super::draw::{DepthUse, Draw, DrawKind, Target, cleared};
 use super::mesh_buffers::MeshBuffers;
-use super::surface::{SurfaceInputs, surface_bindings};
+use super::tangents::Tangents;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, uniform};
+use crate::optics::blur::{TAP_PAIRS, taps};
 use glam::Vec3;
 
 /// Format of the map: irradiance, and coverage in alpha.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+
+/// Turn of the disc between two passes [rad]: neighbours of one pass are not those of the next.
+const TURN: f32 = 0.5;
 
 /// Irradiance in texture space and its blurs.
 pub struct LightMap {
@@ -19,17 +23,14 @@ pub struct LightMap {
 struct Blur {
     draw: Draw,
     knobs: wgpu::Buffer,
-    angle: f32,
 }
 
 /// Mirror of `Blur` in `shaders/blur.wgsl`.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct BlurUniform {
-    pub radius: f32,
-    pub angle: f32,
-    pub pad0: f32,
-    pub pad1: f32,
+    /// Offsets in texels; each is used with its opposite.
+    pub taps: [[i32; 2]; TAP_PAIRS],
 }
 
 impl LightMap {
@@ -39,7 +40,7 @@ impl LightMap {
     pub const BLUR_NAME: &'static str = "blur";
     /// The WGSL files of the texture-space draw, joined in this order.
     pub const WGSL: &'static [Wgsl] =
-        crate::wgsl!["shading.wgsl", "surface_vertex.wgsl", "lightmap.wgsl"];
+        crate::wgsl!["frame.wgsl", "film.wgsl", "light.wgsl", "lightmap.wgsl"];
     /// The WGSL files of a blur, joined in this order.
     pub const BLUR_WGSL: &'static [Wgsl] = crate::wgsl!["blur.wgsl"];
 
@@ -48,15 +49,18 @@ impl LightMap {
     /// # Errors
     ///
     /// [`GpuError::Shader`] if the WGSL does not compile on this adapter.
+    #[allow(clippy::too_many_arguments)]
     pub fn new(
         gpu: &Gpu,
         size_px: u32,
         passes: u32,
-        inputs: &SurfaceInputs<'_>,
+        frame: &wgpu::Buffer,
+        light_constants: &[(&'static str, f64)],
+        mesh: &MeshBuffers,
+        tangents: &Tangents,
+        shadow_map: &wgpu::TextureView,
     ) -> Result<Self, GpuError> {
         let maps = [(); 2].map(|()| Target::new(gpu, Self::NAME, [size_px; 2], FORMAT));
-        // The map can't be read while it is drawn; a texel takes its place.
-        let nothing = Target::new(gpu, "no light map", [1; 2], FORMAT);
         let draw = Draw::new(
             gpu,
             &DrawKind {
@@ -64,46 +68,23 @@ impl LightMap {
                 parts: Self::WGSL,
                 source: &join(Self::WGSL),
                 vertex: "lightmap_vertex",
-                fragment: Some(("lightmap_fragment", FORMAT)),
-                depth: None,
+                fragment: Some(("lightmap_fragment", &[FORMAT])),
+                blend: None,
+                depth: DepthUse::None,
                 cull: None,
-                constants: &[("HAS_SHADOW", f64::from(u8::from(inputs.has_shadow)))],
+                constants: light_constants,
             },
-            &surface_bindings(inputs, &nothing.view),
+            &[
+                Binding::Uniform(frame),
+                Binding::Read(&mesh.positions),
+                Binding::Read(&mesh.point_of),
+                Binding::Read(&mesh.uvs),
+                Binding::Read(&tangents.normals),
+                Binding::Depth(shadow_map),
+            ],
         )?;
         let blurs = (0..passes)
-            .map(|pass| {
-                let angle = 0.5 * pass as f32;
-                let knobs = uniform(
-                    gpu,
-                    Self::BLUR_NAME,
-                    &BlurUniform {
-                        radius: 0.0,
-                        angle,
-                        pad0: 0.0,
-                        pad1: 0.0,
-                    },
-                );
-                let draw = Draw::new(
-                    gpu,
-                    &DrawKind {
-                        pass: Self::BLUR_NAME,
-                        parts: Self::BLUR_WGSL,
-                        source: &join(Self::BLUR_WGSL),
-                        vertex: "blur_vertex",
-                        fragment: Some(("blur_fragment", FORMAT)),
-                        depth: None,
-                        cull: None,
-                        constants: &[],
-                    },
-                    &[
-                        Binding::Uniform(&knobs),
-                        Binding::Texture(&maps[pass as usize % 2].view),
-                        Binding::Sampler(&inputs.maps.sampler),
-                    ],
-                )?;
-                Ok(Blur { draw, knobs, angle })
-            })
+            .map(|pass| Blur::new(gpu, &maps[pass as usize % 2].view))
             .collect::<Result<_, GpuError>>()?;
         Ok(Self { draw, maps, blurs })
     }
@@ -132,12 +113,10 @@ impl LightMap {
             self.draw.set(&mut pass);
             mesh.draw(&mut pass);
         }
+        let radius_px = radius * self.maps[0].texture.width() as f32;
         for (index, blur) in self.blurs.iter().enumerate() {
             let knobs = BlurUniform {
-                radius,
-                angle: blur.angle,
-                pad0: 0.0,
-                pad1: 0.0,
+                taps: taps(radius_px, TURN * index as f32),
             };
             gpu.queue
                 .write_buffer(&blur.knobs, 0, bytemuck::bytes_of(&knobs));
@@ -153,6 +132,33 @@ impl LightMap {
     }
 }
 
+impl Blur {
+    fn new(gpu: &Gpu, source: &wgpu::TextureView) -> Result<Self, GpuError> {
+        let knobs = uniform(
+            gpu,
+            LightMap::BLUR_NAME,
+            &BlurUniform {
+                taps: [[0; 2]; TAP_PAIRS],
+            },
+        );
+        let draw = Draw::new(
+            gpu,
+            &DrawKind {
+                pass: LightMap::BLUR_NAME,
+                parts: LightMap::BLUR_WGSL,
+                source: &join(LightMap::BLUR_WGSL),
+                vertex: "blur_vertex",
+                fragment: Some(("blur_fragment", &[FORMAT])),
+                blend: None,
+                depth: DepthUse::None,
+                cull: None,
+                constants: &[],
+            },
+            &[Binding::Uniform(&knobs), Binding::Unfiltered(source)],
+        )?;
+        Ok(Self { draw, knobs })
+    }
+}
 /// Mean length in texture space of a metre on the surface, from the areas of its triangles.
 pub fn uv_per_m(mesh: &crate::geom::SurfaceMesh) -> f32 {
     let mut area_m2 = 0.0;

@@ -2,6 +2,7 @@
 
 use crate::geom::paint::TissueMaps;
 use crate::gpu::Gpu;
+use crate::optics::tone::linear_from_srgb;
 use image::RgbaImage;
 
 /// Views of the four maps, and how they are sampled.
@@ -43,12 +44,7 @@ impl Maps {
 fn square_roots(image: &RgbaImage) -> RgbaImage {
     let table: Vec<u8> = (0..=255u32)
         .map(|encoded| {
-            let c = encoded as f32 / 255.0;
-            let linear = if c <= 0.04045 {
-                c / 12.92
-            } else {
-                ((c + 0.055) / 1.055).powf(2.4)
-            };
+            let linear = linear_from_srgb(encoded as f32 / 255.0);
             (255.0 * linear.sqrt()).round() as u8
         })
         .collect();

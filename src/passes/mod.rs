@@ -1,7 +1,9 @@
 //! One GPU pass a file. A pass owns the buffers it writes and is immutable once made.
 
+pub mod backdrop;
 pub mod draw;
 pub mod frame;
+pub mod geometry;
 pub mod light_path;
 pub mod lightmap;
 pub mod maps;

@@ -1,6 +1,6 @@
 //! The shadow map of the light that casts shadows: one draw a frame.
 
-use super::draw::{Draw, DrawKind, Target, cleared_depth};
+use super::draw::{DepthUse, Draw, DrawKind, Target, cleared_depth};
 use super::mesh_buffers::MeshBuffers;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, uniform};
 use glam::Mat4;
@@ -14,8 +14,6 @@ pub struct Shadow {
     matrix: wgpu::Buffer,
     /// The map.
     pub target: Target,
-    /// Compares with the map, with linear interpolation.
-    pub sampler: wgpu::Sampler,
 }
 
 impl Shadow {
@@ -31,7 +29,6 @@ impl Shadow {
     /// [`GpuError::Shader`] if the WGSL does not compile on this adapter.
     pub fn new(gpu: &Gpu, mesh: &MeshBuffers) -> Result<Self, GpuError> {
         let matrix = uniform(gpu, Self::NAME, &Mat4::IDENTITY.to_cols_array());
-        let format = wgpu::TextureFormat::Depth32Float;
         let draw = Draw::new(
             gpu,
             &DrawKind {
@@ -40,9 +37,10 @@ impl Shadow {
                 source: &join(Self::WGSL),
                 vertex: "shadow_vertex",
                 fragment: None,
-                depth: Some(format),
-                // The side away from the light: what is lit can't shadow itself.
-                cull: Some(wgpu::Face::Front),
+                blend: None,
+                depth: DepthUse::Nearest,
+                // The side towards the light: where it enters the body.
+                cull: Some(wgpu::Face::Back),
                 constants: &[],
             },
             &[
@@ -54,8 +52,7 @@ impl Shadow {
         Ok(Self {
             draw,
             matrix,
-            target: Target::new(gpu, Self::NAME, [SIZE_PX; 2], format),
-            sampler: comparison_sampler(gpu),
+            target: Target::new(gpu, Self::NAME, [SIZE_PX; 2], super::DEPTH_FORMAT),
         })
     }
 
@@ -80,15 +77,4 @@ impl Shadow {
         self.draw.set(&mut pass);
         mesh.draw(&mut pass);
     }
-}
-
-/// A sampler that answers whether a depth is in front of the map's.
-pub fn comparison_sampler(gpu: &Gpu) -> wgpu::Sampler {
-    gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-        label: Some("shadow"),
-        mag_filter: wgpu::FilterMode::Linear,
-        min_filter: wgpu::FilterMode::Linear,
-        compare: Some(wgpu::CompareFunction::LessEqual),
-        ..Default::default()
-    })
 }

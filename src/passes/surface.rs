@@ -1,10 +1,8 @@
-//! The surface of the scene: one draw a frame, by the one model the scene has.
+//! The surface of the scene: one draw a frame over the covered pixels, by the one model the scene has.
 
-use super::draw::{Draw, DrawKind, Target, cleared, cleared_depth};
+use super::draw::{DepthUse, Draw, DrawKind, Target, cleared, read_depth};
+use super::geometry::GeometryTargets;
 use super::maps::Maps;
-use super::mesh_buffers::MeshBuffers;
-use super::shadow::Shadow;
-use super::tangents::Tangents;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join};
 use crate::scene::{Quadrature, SurfaceKind, SurfaceSection};
 
@@ -12,49 +10,16 @@ use crate::scene::{Quadrature, SurfaceKind, SurfaceSection};
 pub struct SurfaceInputs<'a> {
     /// Camera, lights, knobs.
     pub frame: &'a wgpu::Buffer,
-    /// The mesh.
-    pub mesh: &'a MeshBuffers,
-    /// Its frames.
-    pub tangents: &'a Tangents,
-    /// Its texture maps.
+    /// Values of the `override`s that say which lights there are.
+    pub light_constants: &'a [(&'static str, f64)],
+    /// What lies at each pixel.
+    pub geometry: &'a GeometryTargets,
+    /// The texture maps.
     pub maps: &'a Maps,
-    /// Light-path planes; the normals again where there are none.
-    pub planes: &'a wgpu::Buffer,
-    /// Whether `planes` are planes.
-    pub has_planes: bool,
-    /// Shadow map and its sampler; any depth texture where there is none.
-    pub shadow_view: &'a wgpu::TextureView,
-    /// Compares with it.
-    pub shadow_sampler: &'a wgpu::Sampler,
-    /// Whether it is one.
-    pub has_shadow: bool,
-    /// Lights of the scene.
-    pub light_count: usize,
-}
-
-/// The bindings of `shaders/surface_vertex.wgsl`, in its order.
-pub fn surface_bindings<'a>(
-    inputs: &SurfaceInputs<'a>,
-    light_map: &'a wgpu::TextureView,
-) -> [Binding<'a>; 16] {
-    [
-        Binding::Uniform(inputs.frame),
-        Binding::Read(&inputs.mesh.positions),
-        Binding::Read(&inputs.mesh.point_of),
-        Binding::Read(&inputs.mesh.uvs),
-        Binding::Read(&inputs.tangents.normals),
-        Binding::Read(&inputs.tangents.tangents),
-        Binding::Read(&inputs.tangents.uv_gradients),
-        Binding::Sampler(&inputs.maps.sampler),
-        Binding::Texture(&inputs.maps.outer),
-        Binding::Texture(&inputs.maps.normal),
-        Binding::Texture(&inputs.maps.inner),
-        Binding::Texture(&inputs.maps.layers),
-        Binding::Texture(light_map),
-        Binding::Read(inputs.planes),
-        Binding::Depth(inputs.shadow_view),
-        Binding::Comparison(inputs.shadow_sampler),
-    ]
+    /// Read by the gooey model alone; any texture will do for others.
+    pub light_map: &'a wgpu::TextureView,
+    /// Where light 0 enters the body; any depth texture will do without shadows.
+    pub shadow_map: &'a wgpu::TextureView,
 }
 
 /// The draw of the tissue.
@@ -67,25 +32,37 @@ impl Surface {
     /// The WGSL files of a model, joined in this order.
     pub fn wgsl(kind: SurfaceKind) -> &'static [Wgsl] {
         match kind {
-            SurfaceKind::Plain => {
-                crate::wgsl!["shading.wgsl", "surface_vertex.wgsl", "plain.wgsl"]
-            }
+            SurfaceKind::Plain => crate::wgsl![
+                "frame.wgsl",
+                "pack.wgsl",
+                "film.wgsl",
+                "light.wgsl",
+                "pixel.wgsl",
+                "plain.wgsl"
+            ],
             SurfaceKind::Subsurface => crate::wgsl![
+                "frame.wgsl",
+                "pack.wgsl",
+                "film.wgsl",
+                "light.wgsl",
+                "pixel.wgsl",
                 "medium.wgsl",
-                "shading.wgsl",
-                "surface_vertex.wgsl",
+                "light_plane.wgsl",
                 "subsurface.wgsl"
             ],
             SurfaceKind::Gooey => crate::wgsl![
+                "frame.wgsl",
+                "pack.wgsl",
+                "film.wgsl",
+                "light.wgsl",
+                "pixel.wgsl",
                 "layers.wgsl",
-                "shading.wgsl",
-                "surface_vertex.wgsl",
                 "gooey.wgsl"
             ],
         }
     }
 
-    /// Builds the model that `section` names; `light_map` is read by the gooey one alone.
+    /// Builds the model that `section` names.
     ///
     /// # Errors
     ///
@@ -94,35 +71,43 @@ impl Surface {
         gpu: &Gpu,
         section: &SurfaceSection,
         inputs: &SurfaceInputs<'_>,
-        light_map: &wgpu::TextureView,
     ) -> Result<Self, GpuError> {
-        let parts = Self::wgsl(section.kind);
-        let flag = |on: bool| f64::from(u8::from(on));
-        let mut constants = vec![("HAS_SHADOW", flag(inputs.has_shadow))];
+        Self::with_source(gpu, section, inputs, &join(Self::wgsl(section.kind)))
+    }
+
+    /// As [`Surface::new`] with other WGSL: lets a test sabotage the model and see the check fail.
+    ///
+    /// # Errors
+    ///
+    /// As [`Surface::new`].
+    pub fn with_source(
+        gpu: &Gpu,
+        section: &SurfaceSection,
+        inputs: &SurfaceInputs<'_>,
+        source: &str,
+    ) -> Result<Self, GpuError> {
+        let mut constants = inputs.light_constants.to_vec();
         if section.kind == SurfaceKind::Subsurface {
+            let published = section.quadrature == Quadrature::Published;
             constants.extend([
-                ("HAS_PLANES", flag(inputs.has_planes)),
                 ("SAMPLES", f64::from(section.samples)),
-                ("LIGHTS", inputs.light_count as f64),
-                (
-                    "PUBLISHED",
-                    flag(section.quadrature == Quadrature::Published),
-                ),
+                ("PUBLISHED", f64::from(u8::from(published))),
             ]);
         }
         let draw = Draw::new(
             gpu,
             &DrawKind {
                 pass: section.kind.name(),
-                parts,
-                source: &join(parts),
-                vertex: "vertex",
-                fragment: Some(("fragment", super::RADIANCE_FORMAT)),
-                depth: Some(super::DEPTH_FORMAT),
-                cull: Some(wgpu::Face::Back),
+                parts: Self::wgsl(section.kind),
+                source,
+                vertex: "pixel_vertex",
+                fragment: Some(("fragment", &[super::RADIANCE_FORMAT])),
+                blend: None,
+                depth: DepthUse::Covered,
+                cull: None,
                 constants: &constants,
             },
-            &surface_bindings(inputs, light_map),
+            &bindings(inputs),
         )?;
         Ok(Self {
             kind: section.kind,
@@ -130,15 +115,19 @@ impl Surface {
         })
     }
 
+    /// Reads from `inputs` of another size than before.
+    pub fn rebind(&mut self, gpu: &Gpu, inputs: &SurfaceInputs<'_>) {
+        self.draw.rebind(gpu, self.kind.name(), &bindings(inputs));
+    }
+
     /// Name in logs.
     pub fn name(&self) -> &'static str {
         self.kind.name()
     }
 
-    /// Adds the draw to `encoder`, over cleared targets.
+    /// Adds the draw to `encoder`: radiance where there is tissue, nothing elsewhere.
     pub fn record(
         &self,
-        mesh: &MeshBuffers,
         radiance: &Target,
         depth: &Target,
         encoder: &mut wgpu::CommandEncoder,
@@ -147,39 +136,28 @@ impl Surface {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some(self.name()),
             color_attachments: &[cleared(&radiance.view)],
-            depth_stencil_attachment: Some(cleared_depth(&depth.view)),
+            depth_stencil_attachment: Some(read_depth(&depth.view)),
             timestamp_writes: timer.render(self.name()),
             ..Default::default()
         });
         self.draw.set(&mut pass);
-        mesh.draw(&mut pass);
+        pass.draw(0..3, 0..1);
     }
 }
 
-/// The shadow inputs of a scene without shadows: a depth texture of one texel that is never read.
-pub struct NoShadow {
-    /// The texel.
-    pub target: Target,
-    /// A sampler for it.
-    pub sampler: wgpu::Sampler,
-}
-
-impl NoShadow {
-    /// Makes the texel.
-    pub fn new(gpu: &Gpu) -> Self {
-        Self {
-            target: Target::new(gpu, "no shadow", [1; 2], wgpu::TextureFormat::Depth32Float),
-            sampler: super::shadow::comparison_sampler(gpu),
-        }
-    }
-}
-
-/// View and sampler of a shadow map, or of nothing.
-pub fn shadow_inputs<'a>(
-    shadow: Option<&'a Shadow>,
-    nothing: &'a NoShadow,
-) -> (&'a wgpu::TextureView, &'a wgpu::Sampler) {
-    shadow.map_or((&nothing.target.view, &nothing.sampler), |shadow| {
-        (&shadow.target.view, &shadow.sampler)
-    })
+/// The bindings of `shaders/pixel.wgsl`, in its order.
+fn bindings<'a>(inputs: &SurfaceInputs<'a>) -> [Binding<'a>; 11] {
+    [
+        Binding::Uniform(inputs.frame),
+        Binding::Words(&inputs.geometry.base.view),
+        Binding::Words(&inputs.geometry.detail.view),
+        Binding::Depth(&inputs.geometry.depth.view),
+        Binding::Sampler(&inputs.maps.sampler),
+        Binding::Texture(&inputs.maps.outer),
+        Binding::Texture(&inputs.maps.normal),
+        Binding::Texture(&inputs.maps.inner),
+        Binding::Texture(&inputs.maps.layers),
+        Binding::Texture(inputs.light_map),
+        Binding::Depth(inputs.shadow_map),
+    ]
 }

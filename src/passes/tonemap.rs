@@ -1,17 +1,15 @@
-//! From linear radiance to the picture: one draw a frame, over the part of it that holds something.
+//! From linear radiance to the picture: the backdrop, and one draw over the covered pixels.
 
-use super::draw::{Draw, DrawKind, Target, cleared, kept};
+use super::backdrop::backdrop;
+use super::draw::{DepthUse, Draw, DrawKind, Target, kept, read_depth};
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, uniform};
 
-/// Exposure, tone curve, sRGB. The backdrop is drawn once and copied from then on.
+/// Exposure, tone curve, sRGB, outline.
 pub struct ToneMap {
     draw: Draw,
     exposure: wgpu::Buffer,
     backdrop: Target,
 }
-
-/// Left, top, width and height of a part of the picture [px].
-pub type PartPx = [u32; 4];
 
 impl ToneMap {
     /// Name in logs.
@@ -19,12 +17,12 @@ impl ToneMap {
     /// The WGSL files of this pass, joined in this order.
     pub const WGSL: &'static [Wgsl] = crate::wgsl!["tone.wgsl", "tonemap.wgsl"];
 
-    /// Builds the pass that reads `radiance`.
+    /// Builds the pass that reads `radiance` where `depth` is covered.
     ///
     /// # Errors
     ///
     /// [`GpuError::Shader`] if the WGSL does not compile on this adapter.
-    pub fn new(gpu: &Gpu, radiance: &Target) -> Result<Self, GpuError> {
+    pub fn new(gpu: &Gpu, radiance: &Target, depth: &Target) -> Result<Self, GpuError> {
         let exposure = uniform(gpu, Self::NAME, &[1.0f32; 4]);
         let draw = Draw::new(
             gpu,
@@ -33,59 +31,37 @@ impl ToneMap {
                 parts: Self::WGSL,
                 source: &join(Self::WGSL),
                 vertex: "tonemap_vertex",
-                fragment: Some(("tonemap_fragment", super::PICTURE_FORMAT)),
-                depth: None,
+                fragment: Some(("tonemap_fragment", &[super::PICTURE_FORMAT])),
+                blend: Some(wgpu::BlendState::ALPHA_BLENDING),
+                depth: DepthUse::Covered,
                 cull: None,
                 constants: &[],
             },
             &[
                 Binding::Uniform(&exposure),
                 Binding::Unfiltered(&radiance.view),
+                Binding::Depth(&depth.view),
             ],
         )?;
-        let size = [radiance.texture.width(), radiance.texture.height()];
-        let tone_map = Self {
+        Ok(Self {
             draw,
             exposure,
-            backdrop: Target::new(gpu, "backdrop", size, super::PICTURE_FORMAT),
-        };
-        tone_map.draw_backdrop(gpu, radiance);
-        Ok(tone_map)
+            backdrop: backdrop(gpu, radiance.size()),
+        })
     }
 
-    /// Draws what an empty picture shows.
-    fn draw_backdrop(&self, gpu: &Gpu, radiance: &Target) {
-        let mut encoder = gpu.encoder();
-        drop(encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("no radiance"),
-            color_attachments: &[cleared(&radiance.view)],
-            ..Default::default()
-        }));
-        {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("backdrop"),
-                color_attachments: &[cleared(&self.backdrop.view)],
-                ..Default::default()
-            });
-            self.draw.set(&mut pass);
-            pass.draw(0..3, 0..1);
-        }
-        gpu.queue.submit([encoder.finish()]);
-    }
-
-    /// Adds the draw to `encoder`; nothing is drawn outside `part`.
+    /// Adds the copy of the backdrop and the draw to `encoder`.
     pub fn record(
         &self,
         gpu: &Gpu,
         exposure: f32,
-        part: PartPx,
+        depth: &Target,
         picture: &Target,
         encoder: &mut wgpu::CommandEncoder,
         timer: &mut Timer,
     ) {
-        let value = [exposure; 4];
         gpu.queue
-            .write_buffer(&self.exposure, 0, bytemuck::bytes_of(&value));
+            .write_buffer(&self.exposure, 0, bytemuck::bytes_of(&[exposure; 4]));
         encoder.copy_texture_to_texture(
             self.backdrop.texture.as_image_copy(),
             picture.texture.as_image_copy(),
@@ -94,11 +70,10 @@ impl ToneMap {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some(Self::NAME),
             color_attachments: &[kept(&picture.view)],
+            depth_stencil_attachment: Some(read_depth(&depth.view)),
             timestamp_writes: timer.render(Self::NAME),
             ..Default::default()
         });
-        let [left, top, width, height] = part;
-        pass.set_scissor_rect(left, top, width, height);
         self.draw.set(&mut pass);
         pass.draw(0..3, 0..1);
     }

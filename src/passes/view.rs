@@ -1,7 +1,11 @@
 //! What the shaders know of a frame: camera, lights, layers and knobs, as one uniform.
 
+use crate::optics::Layer;
 use crate::scene::{LIGHTS_MAX, PlacedLight, RestBox, Scene, SurfaceSection};
 use glam::{Mat4, Vec3};
+
+/// The march ends where the clearest layer has left exp(-8) of the light.
+const OPTICAL_DEPTH_MAX: f32 = 8.0;
 
 /// A camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,7 +72,7 @@ pub fn shadow_from_world(toward: Vec3, points: &[Vec3]) -> Mat4 {
     clip_from_light * light_from_world
 }
 
-/// Mirror of `Light` in `shaders/shading.wgsl`.
+/// Mirror of `Light` in `shaders/frame.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct LightUniform {
@@ -76,32 +80,35 @@ pub struct LightUniform {
     pub power: [f32; 4],
 }
 
-/// Mirror of `Frame` in `shaders/shading.wgsl`.
+/// Mirror of `Frame` in `shaders/frame.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct FrameUniform {
     pub clip_from_world: [f32; 16],
+    pub world_from_clip: [f32; 16],
     pub shadow_from_world: [f32; 16],
     pub eye: [f32; 4],
     pub lights: [LightUniform; LIGHTS_MAX],
     pub extinction: [[f32; 4]; 4],
-    pub scattering: [[f32; 4]; 4],
-    pub light_count: u32,
+    pub albedo: [[f32; 4]; 4],
+    pub through: [f32; 4],
+    pub size: [f32; 4],
     pub layer_depth_max_m: f32,
+    pub reach_m: f32,
     pub color_blend: f32,
     pub multiple_scattering: f32,
     pub wrap: f32,
     pub layer_distance_m: f32,
-    pub blur_radius_m: f32,
     pub outer_opacity: f32,
     pub relief: f32,
     pub roughness: f32,
     pub wetness: f32,
-    pub exposure: f32,
-    pub light_map_texel: f32,
-    pub shadow_texel_m: f32,
-    pub uv_per_m: f32,
+    pub shadow_depth_m: f32,
+    pub shadow_bias_m: f32,
     pub map_level: f32,
+    pub pad0: f32,
+    pub pad1: f32,
+    pub pad2: f32,
 }
 
 /// The lights of a scene, the one that casts shadows first.
@@ -116,18 +123,32 @@ pub fn placed_lights(scene: &Scene, rest: &RestBox) -> Vec<PlacedLight> {
     lights
 }
 
+/// What is constant in the shaders of a scene: values of their `override`s.
+pub fn light_constants(lights: &[PlacedLight]) -> Vec<(&'static str, f64)> {
+    let points = lights
+        .iter()
+        .enumerate()
+        .filter(|(_, light)| light.is_point)
+        .fold(0u32, |bits, (k, _)| bits | 1 << k);
+    let has_shadow = lights.first().is_some_and(|light| light.shadow);
+    vec![
+        ("LIGHT_COUNT", lights.len() as f64),
+        ("POINT_LIGHTS", f64::from(points)),
+        ("HAS_SHADOW", f64::from(u8::from(has_shadow))),
+    ]
+}
+
 impl FrameUniform {
-    /// Camera, lights and knobs of one frame of a picture of `size` [px] with maps of `map_size_px`.
+    /// Camera, lights and knobs of one frame of a picture of `size` [px]; `map_px_per_m` is how many texels of
+    /// the maps lie on a metre of the surface.
     pub fn new(
         view: &View,
         size: [u32; 2],
         lights: &[PlacedLight],
         surface: &SurfaceSection,
         shadow_from_world: Mat4,
-        uv_per_m: f32,
-        map_size_px: u32,
+        map_px_per_m: f32,
     ) -> Self {
-        let aspect = size[0] as f32 / size[1] as f32;
         let light = |k: usize| match lights.get(k) {
             None => LightUniform {
                 place: [0.0; 4],
@@ -144,50 +165,54 @@ impl FrameUniform {
                     .to_array(),
             },
         };
-        let extinction = surface.layers.map(|layer| {
-            let [r, g, b] =
-                std::array::from_fn(|c| layer.absorption_per_m[c] + layer.scattering_per_m[c]);
-            [r, g, b, 0.0]
-        });
-        let scattering = surface.layers.map(|layer| {
-            let [r, g, b] = layer.scattering_per_m;
-            [r, g, b, layer.asymmetry]
-        });
-        // Length of the clip axes seen from the world: a shadow texel in metres.
-        let shadow_width_m = 2.0 / shadow_from_world.row(0).truncate().length().max(1e-6);
+        let layers = surface.layers.map(Layer::from);
+        let clearest = layers
+            .iter()
+            .map(|layer| layer.extinction_per_m().min_element())
+            .fold(f32::INFINITY, f32::min);
+        let [width, height] = size.map(|side| side as f32);
+        let clip_from_world = view.clip_from_world(width / height);
+        // Rows of the matrix: clip units a metre across and along the light.
+        let across = shadow_from_world.row(0).truncate().length().max(1e-9);
+        let along = shadow_from_world.row(2).truncate().length().max(1e-9);
         Self {
-            clip_from_world: view.clip_from_world(aspect).to_cols_array(),
+            clip_from_world: clip_from_world.to_cols_array(),
+            world_from_clip: clip_from_world.inverse().to_cols_array(),
             shadow_from_world: shadow_from_world.to_cols_array(),
             eye: view.eye.extend(1.0).to_array(),
             lights: std::array::from_fn(light),
-            extinction,
-            scattering,
-            light_count: lights.len().min(LIGHTS_MAX) as u32,
+            extinction: layers
+                .map(|layer| layer.extinction_per_m().extend(layer.asymmetry).to_array()),
+            albedo: layers.map(|layer| layer.albedo().extend(0.0).to_array()),
+            through: layers[3].diffuse_attenuation_per_m().extend(0.0).to_array(),
+            size: [width, height, 1.0 / width, 1.0 / height],
             layer_depth_max_m: surface.layer_depth_max_m,
+            reach_m: OPTICAL_DEPTH_MAX / clearest,
             color_blend: surface.color_blend,
             multiple_scattering: surface.multiple_scattering,
             wrap: surface.wrap,
             layer_distance_m: surface.layer_distance_m,
-            blur_radius_m: surface.blur_radius_m,
             outer_opacity: surface.outer_opacity,
             relief: surface.relief,
             roughness: surface.roughness,
             wetness: surface.wetness,
-            exposure: surface.exposure,
-            light_map_texel: 1.0 / surface.light_map_size_px as f32,
-            shadow_texel_m: shadow_width_m / super::shadow::SIZE_PX as f32,
-            uv_per_m,
-            map_level: map_level(view, size[1], uv_per_m, map_size_px),
+            shadow_depth_m: 1.0 / along,
+            // Two texels: what a slope of 60 degrees rises over one.
+            shadow_bias_m: 2.0 * 2.0 / (across * super::shadow::SIZE_PX as f32),
+            map_level: map_level(view, size[1], map_px_per_m),
+            pad0: 0.0,
+            pad1: 0.0,
+            pad2: 0.0,
         }
     }
 }
 
-/// Level of maps of `map_size_px` at which a texel is about as large as a pixel of a picture that is
-/// `height_px` high, at the distance of the view's target.
-fn map_level(view: &View, height_px: u32, uv_per_m: f32, map_size_px: u32) -> f32 {
+/// Level of the maps at which a texel is about as large as a pixel of a picture `height_px` high, at the
+/// distance of the view's target. One for the whole frame: levels by the pixel cost a software adapter more.
+fn map_level(view: &View, height_px: u32, map_px_per_m: f32) -> f32 {
     let pixel_m =
         2.0 * view.eye.distance(view.target) * (0.5 * view.fov_y).tan() / height_px as f32;
-    let texels = pixel_m * uv_per_m * map_size_px as f32;
+    let texels = pixel_m * map_px_per_m;
     texels.max(1e-6).log2().round().clamp(0.0, 3.0)
 }
 

@@ -1,10 +1,9 @@
 //! `[surface]`: the one surface model of a scene, its layers and its knobs.
 
 use super::check::Checker;
+use crate::optics::{LAYERS, Layer};
+use glam::Vec3;
 use serde::{Deserialize, Serialize};
-
-/// Layers that one RGBA texture holds.
-pub const LAYERS: usize = 4;
 
 /// How the surface is drawn.
 #[derive(Clone, Debug, Deserialize, Serialize, PartialEq)]
@@ -92,6 +91,16 @@ pub struct LayerSection {
     pub scattering_per_m: [f32; 3],
     /// Schlick's k, which the papers call g: above 0 light is scattered forwards.
     pub asymmetry: f32,
+}
+
+impl From<LayerSection> for Layer {
+    fn from(section: LayerSection) -> Self {
+        Self {
+            absorption_per_m: Vec3::from_array(section.absorption_per_m),
+            scattering_per_m: Vec3::from_array(section.scattering_per_m),
+            asymmetry: section.asymmetry,
+        }
+    }
 }
 
 impl Default for SurfaceSection {
