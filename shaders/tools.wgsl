@@ -55,7 +55,7 @@ fn room(direction: vec3f) -> vec3f {
     let up = smoothstep(-0.2, 1.0, direction.y);
     let lamp = smoothstep(0.86, 0.97, dot(direction, normalize(vec3f(-0.35, 0.85, 0.4))));
     let rim = smoothstep(0.8, 0.98, dot(direction, normalize(vec3f(0.9, 0.15, -0.3))));
-    return mix(vec3f(0.02, 0.022, 0.025), vec3f(0.20, 0.22, 0.24), up)
+    return mix(vec3f(0.05, 0.052, 0.055), vec3f(0.62, 0.66, 0.70), up)
         + 2.2 * lamp * vec3f(1.0, 0.97, 0.92) + 0.5 * rim * vec3f(0.7, 0.85, 1.0);
 }
 

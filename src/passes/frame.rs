@@ -150,7 +150,7 @@ impl FramePasses {
         let mesh = MeshBuffers::new(gpu, surface_mesh)?;
         let tangents = Tangents::new(gpu, surface_mesh, &mesh)?;
         let radius_m = patch_radius_m(scene);
-        let tolerance_m = scene.light_path.tolerance_m.unwrap_or(radius_m / 2000.0);
+        let tolerance_m = scene.light_path.tolerance_m.unwrap_or(radius_m / 1000.0);
         let light_path = LightPath::new(
             gpu,
             effective_method(scene).unwrap_or(LightPathMethod::Tangent),
