@@ -179,7 +179,7 @@ fn mirrors() -> Vec<Mirror> {
                 light_map_texel,
                 shadow_texel_m,
                 uv_per_m,
-                pad0,
+                map_level,
             }
         ),
         mirror!(
