@@ -128,7 +128,8 @@ fn crate_faults(path: &str, source: &str) -> Vec<String> {
 
 /// What the header of a kernel lacks. `exists` tells whether a file has a function.
 fn kernel_faults(path: &str, source: &str, exists: impl Fn(&str, &str) -> bool) -> Vec<String> {
-    let has_bindings = source.contains("@binding");
+    let stages = ["@compute", "@vertex", "@fragment"];
+    let is_kernel = stages.iter().any(|stage| source.contains(stage));
     let header: Vec<&str> = source
         .lines()
         .take_while(|line| line.starts_with("//"))
@@ -138,8 +139,8 @@ fn kernel_faults(path: &str, source: &str, exists: impl Fn(&str, &str) -> bool) 
         let mut values = lines.filter_map(|line| line.trim_start_matches("// ").strip_prefix(key));
         values.next().map(str::trim)
     };
-    // A shared file without bindings and without a formula of its own needs no twin.
-    if !has_bindings && value("Twin:").is_none() {
+    // A shared file without a formula of its own needs no twin.
+    if !is_kernel && value("Twin:").is_none() {
         return Vec::new();
     }
     let mut faults = Vec::new();
@@ -147,7 +148,7 @@ fn kernel_faults(path: &str, source: &str, exists: impl Fn(&str, &str) -> bool) 
         faults.push(format!("{path} names no source"));
     }
     for key in ["Twin:", "Parity:"] {
-        if key == "Parity:" && !has_bindings && value(key).is_none() {
+        if key == "Parity:" && !is_kernel && value(key).is_none() {
             continue;
         }
         let Some((file, function)) = value(key).and_then(|v| v.split_once(", fn ")) else {
@@ -251,13 +252,13 @@ fn every_kernel_names_a_source_and_a_twin_that_exists() {
 #[test]
 fn kernel_check_rejects_a_missing_source_and_a_twin_that_is_gone() {
     let kernel = "// Normals.\n// Source:  a paper.\n// Twin:    src/a.rs, fn twin\n\
-                  // Parity:  tests/a.rs, fn parity\n@group(0) @binding(0) var<uniform> p: P;\n";
+                  // Parity:  tests/a.rs, fn parity\n@compute @workgroup_size(64) fn main() {}\n";
     let both = |_: &str, function: &str| ["twin", "parity"].contains(&function);
     assert!(kernel_faults("a.wgsl", kernel, both).is_empty());
     let without_source = kernel.replace("// Source:  a paper.\n", "");
     assert_eq!(kernel_faults("a.wgsl", &without_source, both).len(), 1);
     assert_eq!(kernel_faults("a.wgsl", kernel, |_, f| f == "twin").len(), 1);
-    let without_header = "@group(0) @binding(0) var<uniform> p: P;\n";
+    let without_header = "@compute @workgroup_size(64) fn main() {}\n";
     assert_eq!(kernel_faults("a.wgsl", without_header, both).len(), 3);
     assert!(has_function("src/geom/plane.rs", "fit_plane"));
     assert!(!has_function("src/geom/plane.rs", "fit_plan"));

@@ -4,6 +4,7 @@
 
 use palpate::geom::moments::PatchSums;
 use palpate::gpu::{Wgsl, join};
+use palpate::passes::geometry::Geometry;
 use palpate::passes::lightmap::{BlurUniform, LightMap};
 use palpate::passes::plane_carried::{self, PlaneCarried};
 use palpate::passes::plane_full::{self, PlaneFull};
@@ -28,6 +29,7 @@ fn shaders() -> Vec<(&'static str, &'static [Wgsl])> {
         ("full planes, fit", PlaneFull::FIT_WGSL),
         ("incremental planes, moved", PlaneIncremental::MOVED_WGSL),
         ("incremental planes, update", PlaneIncremental::UPDATE_WGSL),
+        ("geometry", Geometry::WGSL),
         ("shadow", Shadow::WGSL),
         ("light map", LightMap::WGSL),
         ("blur", LightMap::BLUR_WGSL),
@@ -143,43 +145,37 @@ fn mirrors() -> Vec<Mirror> {
                 pad2
             }
         ),
-        mirror!(
-            LightMap::BLUR_WGSL,
-            "Blur",
-            BlurUniform {
-                radius,
-                angle,
-                pad0,
-                pad1
-            }
-        ),
+        mirror!(LightMap::BLUR_WGSL, "Blur", BlurUniform { taps }),
         mirror!(shading, "Light", LightUniform { place, power }),
         mirror!(
             shading,
             "Frame",
             FrameUniform {
                 clip_from_world,
+                world_from_clip,
                 shadow_from_world,
                 eye,
                 lights,
                 extinction,
-                scattering,
-                light_count,
+                albedo,
+                through,
+                size,
                 layer_depth_max_m,
+                reach_m,
                 color_blend,
                 multiple_scattering,
                 wrap,
                 layer_distance_m,
-                blur_radius_m,
                 outer_opacity,
                 relief,
                 roughness,
                 wetness,
-                exposure,
-                light_map_texel,
-                shadow_texel_m,
-                uv_per_m,
+                shadow_depth_m,
+                shadow_bias_m,
+                map_level,
                 pad0,
+                pad1,
+                pad2,
             }
         ),
         mirror!(
@@ -239,7 +235,8 @@ fn validity_fault(source: &str) -> Option<String> {
     };
     naga::valid::Validator::new(
         naga::valid::ValidationFlags::all(),
-        naga::valid::Capabilities::default(),
+        // What every WebGPU device has; the first is `unpack2x16float`.
+        naga::valid::Capabilities::SHADER_FLOAT16_IN_FLOAT32 | naga::valid::Capabilities::default(),
     )
     .validate(&module)
     .err()
