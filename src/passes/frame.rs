@@ -395,7 +395,9 @@ mod tests {
         ));
         assert_eq!(
             names(&gooey),
-            ["tangents", "lightmap", "blur", "gooey", "tonemap"]
+            [
+                "tangents", "lightmap", "blur", "geometry", "gooey", "tonemap"
+            ]
         );
         assert_eq!(gooey.count_of("blur"), 3);
         assert_eq!(gooey.count_of("planes-full"), 0);
