@@ -56,6 +56,6 @@ mod tests {
             );
             last = shown;
         }
-        assert_eq!(last, 1.0);
+        assert!(last > 0.999_999, "{last}");
     }
 }

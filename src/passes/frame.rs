@@ -370,9 +370,9 @@ mod tests {
     }
 
     #[test]
-    fn a_plain_scene_without_shadow_records_three_passes() {
+    fn a_plain_scene_without_shadow_records_four_passes() {
         let plan = plan("[surface]\nkind = \"plain\"");
-        assert_eq!(names(&plan), ["tangents", "plain", "tonemap"]);
+        assert_eq!(names(&plan), ["tangents", "geometry", "plain", "tonemap"]);
         assert!(plan.left_out.contains(&"planes-incremental"));
     }
 
@@ -382,14 +382,22 @@ mod tests {
         let marched = plan(&format!("{method}[surface]\nkind = \"subsurface\""));
         assert_eq!(
             names(&marched),
-            ["tangents", "planes-full", "subsurface", "tonemap"]
+            [
+                "tangents",
+                "planes-full",
+                "geometry",
+                "subsurface",
+                "tonemap"
+            ]
         );
         let gooey = plan(&format!(
             "{method}[surface]\nkind = \"gooey\"\nblur_passes = 3"
         ));
         assert_eq!(
             names(&gooey),
-            ["tangents", "lightmap", "blur", "gooey", "tonemap"]
+            [
+                "tangents", "lightmap", "blur", "geometry", "gooey", "tonemap"
+            ]
         );
         assert_eq!(gooey.count_of("blur"), 3);
         assert_eq!(gooey.count_of("planes-full"), 0);
