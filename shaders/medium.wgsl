@@ -47,6 +47,15 @@ fn optical_depth(s: f32, cosine: f32, bottoms: vec3f, layers: Layers) -> vec3f {
         + (s - ends.z) * layers.t3;
 }
 
+// Mean of exp(-A) over a piece of one layer along which A goes evenly from a0 to a1; e0 and e1 are exp(-a0) and
+// exp(-a1). Never a growing exponential, and one exponential a sample.
+fn mean_transmittance(a0: vec3f, a1: vec3f, e0: vec3f, e1: vec3f) -> vec3f {
+    let change = a1 - a0;
+    // Where A hardly changes the quotient loses its digits; there the mean of the ends errs by change^2 / 12.
+    let is_flat = abs(change) < vec3f(0.02);
+    return select((e0 - e1) / select(change, vec3f(1.0), is_flat), 0.5 * (e0 + e1), is_flat);
+}
+
 // Share of a segment that lies above each boundary; `start` and `end` are how far its ends lie below them [m].
 fn above(start: vec3f, end: vec3f) -> vec3f {
     let below = max(start, vec3f(0.0)) + max(end, vec3f(0.0));

@@ -1,7 +1,7 @@
 // Layers of tissue: light scattered once, gathered along the view ray below the surface; light scattered more
 // often, as diffuse light; the wet film on top.
 //
-//   M(t) = P - t w_out,  t = T (i/n)^2 (closed form) or T i/n (as published)
+//   M(t) = P - t w_out,  t at the layers' ends (by layer), T (i/n)^2 (closed form) or T i/n (as published)
 //   T    = min(deepest layer / N.w_out, cap, exp(-8) of the clearest layer)
 //   (ds, dt) = (PM . g_u, PM . g_v)                        with the metric of the deformed surface
 //   L    = sum over lights and segments (medium.wgsl) + albedo diffuse / pi + film
@@ -18,8 +18,11 @@
 // Units:   metres, 1/m, W/(m2 sr).
 // Fails:   folds below the patch radius; light that enters far from P.
 
+// 0 by layer, 1 closed form, 2 as published.
+override QUADRATURE: u32 = 0u;
+// Samples of the last two; of the first, samples in each layer.
 override SAMPLES: u32 = 4u;
-override PUBLISHED: u32 = 0u;
+override PIECES: u32 = 1u;
 
 // What the march needs of a ray.
 struct Ray {
@@ -33,12 +36,26 @@ struct Ray {
     drift: vec2f,
 }
 
-// One light on its way along the ray: its cosines with both planes, its optical depth at the last sample.
+// One light on its way along the ray: its cosines with both planes; phase function of the layers; its optical
+// depth A, with that from the eye, at the last sample, and exp(-A).
 struct Beam {
     facing: vec2f,
     irradiance: vec3f,
-    sources: Layers,
+    phases: vec4f,
     depth: vec3f,
+    left: vec3f,
+}
+
+// Where the march is. Beams of lights that the scene does not have are never touched.
+struct March {
+    t: f32,
+    // Optical depth from the eye.
+    a: vec3f,
+    bottoms: vec3f,
+    beam0: Beam,
+    beam1: Beam,
+    beam2: Beam,
+    beam3: Beam,
 }
 
 fn bottoms_at(ray: Ray, t: f32) -> vec3f {
@@ -55,34 +72,157 @@ fn extinctions() -> Layers {
     );
 }
 
-fn beam_start(k: u32, ray: Ray) -> Beam {
-    return beam_at(k, ray, 0.0, 0.0, vec3f(0.0), extinctions());
+fn reach_of(ray: Ray) -> f32 {
+    return min(frame.layer_depth_max_m / max(ray.pair.tangent_eye, 0.125), frame.reach_m);
 }
 
-fn beam_at(k: u32, ray: Ray, t: f32, blend: f32, bottoms: vec3f, layers: Layers) -> Beam {
-    let lit = light_at(k, ray.world - t * ray.to_eye);
-    let facing = vec2f(dot(ray.normal, lit.to_light), dot(ray.plane, lit.to_light));
-    let p = phases(dot(lit.to_light, ray.to_eye), vec4f(
-        frame.extinction[0].w,
-        frame.extinction[1].w,
-        frame.extinction[2].w,
-        frame.extinction[3].w,
-    ));
-    let sources = Layers(
-        p.x * frame.albedo[0].xyz,
-        p.y * frame.albedo[1].xyz,
-        p.z * frame.albedo[2].xyz,
-        p.w * frame.albedo[3].xyz,
-    );
-    let way = way_to_light(ray.pair, t, blend, facing.x, facing.y);
-    return Beam(facing, lit.irradiance, sources, light_depth(way, bottoms, layers));
-}
-
-// Beyond any eye's reach where the plane faces away.
+// Optical depth of a way to the light; beyond any eye's reach where the plane faces away.
 fn light_depth(way: vec2f, bottoms: vec3f, layers: Layers) -> vec3f {
     return select(vec3f(60.0), optical_depth(way.x, way.y, bottoms, layers), way.y > 0.0);
 }
 
+fn beam_start(k: u32, ray: Ray) -> Beam {
+    let lit = light_at(k, ray.world);
+    let facing = vec2f(dot(ray.normal, lit.to_light), dot(ray.plane, lit.to_light));
+    let k_of_layers = vec4f(
+        frame.extinction[0].w,
+        frame.extinction[1].w,
+        frame.extinction[2].w,
+        frame.extinction[3].w,
+    );
+    let depth = select(vec3f(60.0), vec3f(0.0), facing.x > 1e-3);
+    let p = phases(dot(lit.to_light, ray.to_eye), k_of_layers);
+    return Beam(facing, lit.irradiance, p, depth, exp(-depth));
+}
+
+// A near light's direction and distance change along the ray.
+fn turned(k: u32, ray: Ray, t: f32, beam: Beam) -> Beam {
+    if (POINT_LIGHTS & (1u << k)) == 0u {
+        return beam;
+    }
+    let lit = light_at(k, ray.world - t * ray.to_eye);
+    return Beam(
+        vec2f(dot(ray.normal, lit.to_light), dot(ray.plane, lit.to_light)),
+        lit.irradiance,
+        beam.phases,
+        beam.depth,
+        beam.left,
+    );
+}
+
+fn march_start(ray: Ray, unshadowed: f32) -> March {
+    var m: March;
+    m.bottoms = bottoms_at(ray, 0.0);
+    m.beam0 = beam_start(0u, ray);
+    m.beam0.irradiance *= unshadowed;
+    if LIGHT_COUNT > 1u {
+        m.beam1 = beam_start(1u, ray);
+    }
+    if LIGHT_COUNT > 2u {
+        m.beam2 = beam_start(2u, ray);
+    }
+    if LIGHT_COUNT > 3u {
+        m.beam3 = beam_start(3u, ray);
+    }
+    return m;
+}
+
+// A sample within one layer: the stretch from the last one to it.
+struct Stretch {
+    t: f32,
+    blend: f32,
+    bottoms: vec3f,
+    // Optical depth from the eye at both ends.
+    a0: vec3f,
+    a1: vec3f,
+}
+
+// A beam at the end of a stretch, and what the stretch sends to the eye, per albedo and phase.
+struct Followed {
+    beam: Beam,
+    light: vec3f,
+}
+
+fn follow(k: u32, ray: Ray, s: Stretch, layers: Layers, last: Beam) -> Followed {
+    var next = turned(k, ray, s.t, last);
+    let way = way_to_light(ray.pair, s.t, s.blend, next.facing.x, next.facing.y);
+    next.depth = light_depth(way, s.bottoms, layers);
+    let before = s.a0 + last.depth;
+    let after = s.a1 + next.depth;
+    next.left = exp(-after);
+    let mean = mean_transmittance(before, after, last.left, next.left);
+    return Followed(next, (s.a1 - s.a0) * mean * last.irradiance);
+}
+
+// Gathers one layer of extinction `sigma` [1/m]. `pick` is 1 for the boundary at which it ends, 0 for the last
+// layer, which ends where the march does; `p` is the layer's phase function for each light. The end is looked for
+// where the last sample's layers say it is, and corrected once by what is found there.
+fn gather_layer(
+    m: ptr<function, March>,
+    ray: Ray,
+    layers: Layers,
+    sigma: vec3f,
+    pick: vec3f,
+    p: vec4f,
+) -> vec3f {
+    let n_v = max(ray.pair.tangent_eye, 1e-3);
+    let reach = reach_of(ray);
+    let is_last = all(pick == vec3f(0.0));
+    var sum = vec3f(0.0);
+    for (var left = PIECES; left > 0u; left -= 1u) {
+        let part = 1.0 / f32(left);
+        let t = (*m).t;
+        let guess = select(clamp(dot(pick, (*m).bottoms) / n_v, t, reach), reach, is_last);
+        let bottoms = bottoms_at(ray, t + (guess - t) * part);
+        let end = select(clamp(dot(pick, bottoms) / n_v, t, reach), reach, is_last);
+        let next = t + (end - t) * part;
+        let share = next / reach;
+        let a0 = (*m).a;
+        let s = Stretch(next, share * share, bottoms, a0, a0 + (next - t) * sigma);
+        var got = follow(0u, ray, s, layers, (*m).beam0);
+        (*m).beam0 = got.beam;
+        sum += p.x * got.light;
+        if LIGHT_COUNT > 1u {
+            got = follow(1u, ray, s, layers, (*m).beam1);
+            (*m).beam1 = got.beam;
+            sum += p.y * got.light;
+        }
+        if LIGHT_COUNT > 2u {
+            got = follow(2u, ray, s, layers, (*m).beam2);
+            (*m).beam2 = got.beam;
+            sum += p.z * got.light;
+        }
+        if LIGHT_COUNT > 3u {
+            got = follow(3u, ray, s, layers, (*m).beam3);
+            (*m).beam3 = got.beam;
+            sum += p.w * got.light;
+        }
+        (*m).t = next;
+        (*m).a = s.a1;
+        (*m).bottoms = bottoms;
+    }
+    return sum;
+}
+
+// One sample at the end of each layer, or several evenly within each: exact for parallel layers.
+fn by_layer(ray: Ray, unshadowed: f32) -> Gathered {
+    let layers = extinctions();
+    var m = march_start(ray, unshadowed);
+    let p0 = m.beam0.phases;
+    let p1 = m.beam1.phases;
+    let p2 = m.beam2.phases;
+    let p3 = m.beam3.phases;
+    let first = gather_layer(&m, ray, layers, layers.t0, vec3f(1.0, 0.0, 0.0), vec4f(p0.x, p1.x, p2.x, p3.x));
+    let second = gather_layer(&m, ray, layers, layers.t1, vec3f(0.0, 1.0, 0.0), vec4f(p0.y, p1.y, p2.y, p3.y));
+    let third = gather_layer(&m, ray, layers, layers.t2, vec3f(0.0, 0.0, 1.0), vec4f(p0.z, p1.z, p2.z, p3.z));
+    let fourth = gather_layer(&m, ray, layers, layers.t3, vec3f(0.0), vec4f(p0.w, p1.w, p2.w, p3.w));
+    return Gathered(
+        first * frame.albedo[0].xyz + second * frame.albedo[1].xyz,
+        third * frame.albedo[2].xyz + fourth * frame.albedo[3].xyz,
+    );
+}
+
+// A step of the other two rules, which may cross layers.
 struct Step {
     t: f32,
     blend: f32,
@@ -92,80 +232,86 @@ struct Step {
     below: vec3f,
 }
 
-// Moves a beam to the end of a step and returns what the step sends to the eye.
-fn advance(k: u32, ray: Ray, step: Step, layers: Layers, beam: ptr<function, Beam>) -> Gathered {
-    let last = *beam;
-    if (POINT_LIGHTS & (1u << k)) != 0u {
-        *beam = beam_at(k, ray, step.t, step.blend, step.bottoms, layers);
-    } else {
-        let way = way_to_light(ray.pair, step.t, step.blend, last.facing.x, last.facing.y);
-        (*beam).depth = light_depth(way, step.bottoms, layers);
-    }
-    var got = gather(step.segment, last.depth, (*beam).depth, last.sources);
-    if PUBLISHED != 0u {
-        got = gather_at_start(step.segment, last.depth, step.below, last.sources);
-    }
-    return Gathered(got.upper * last.irradiance, got.lower * last.irradiance);
+// A beam at the end of a step, and what the step sends to the eye.
+struct Advanced {
+    beam: Beam,
+    light: Gathered,
 }
 
-fn single_scattering(ray: Ray, unshadowed: f32) -> Gathered {
+fn advance(k: u32, ray: Ray, step: Step, layers: Layers, last: Beam) -> Advanced {
+    var next = turned(k, ray, step.t, last);
+    let way = way_to_light(ray.pair, step.t, step.blend, next.facing.x, next.facing.y);
+    next.depth = light_depth(way, step.bottoms, layers);
+    let sources = Layers(
+        last.phases.x * frame.albedo[0].xyz,
+        last.phases.y * frame.albedo[1].xyz,
+        last.phases.z * frame.albedo[2].xyz,
+        last.phases.w * frame.albedo[3].xyz,
+    );
+    var got: Gathered;
+    if QUADRATURE == 2u {
+        got = gather_at_start(step.segment, last.depth, step.below, sources);
+    } else {
+        got = gather(step.segment, last.depth, next.depth, sources);
+    }
+    return Advanced(next, Gathered(got.upper * last.irradiance, got.lower * last.irradiance));
+}
+
+// Equal steps valued at their start, or steps that grow with depth and are integrated layer by layer.
+fn by_step(ray: Ray, unshadowed: f32) -> Gathered {
     let layers = extinctions();
     let n_v = max(ray.pair.tangent_eye, 1e-3);
-    let reach = min(frame.layer_depth_max_m / max(n_v, 0.125), frame.reach_m);
-    var beam0 = beam_start(0u, ray);
-    beam0.irradiance *= unshadowed;
-    var beam1: Beam;
-    var beam2: Beam;
-    var beam3: Beam;
-    if LIGHT_COUNT > 1u {
-        beam1 = beam_start(1u, ray);
-    }
-    if LIGHT_COUNT > 2u {
-        beam2 = beam_start(2u, ray);
-    }
-    if LIGHT_COUNT > 3u {
-        beam3 = beam_start(3u, ray);
-    }
+    let reach = reach_of(ray);
+    var m = march_start(ray, unshadowed);
     var upper = vec3f(0.0);
     var lower = vec3f(0.0);
-    var t = 0.0;
-    var a = vec3f(0.0);
-    var below = -bottoms_at(ray, 0.0);
+    var below = -m.bottoms;
     for (var i = 1u; i <= SAMPLES; i += 1u) {
         let even = f32(i) * (1.0 / f32(SAMPLES));
-        let share = select(even * even, even, PUBLISHED != 0u);
+        let share = select(even * even, even, QUADRATURE == 2u);
         let next = reach * share;
         let bottoms = bottoms_at(ray, next);
         let below_next = next * n_v - bottoms;
         var shares = above(below, below_next);
-        if PUBLISHED != 0u {
+        if QUADRATURE == 2u {
             shares = select(vec3f(1.0), vec3f(0.0), below > vec3f(0.0));
         }
-        let blend = select(share * share, share, PUBLISHED != 0u);
-        let step = Step(next, blend, bottoms, segment(a, next - t, shares, layers), below);
-        var got = advance(0u, ray, step, layers, &beam0);
-        upper += got.upper;
-        lower += got.lower;
+        let blend = select(share * share, share, QUADRATURE == 2u);
+        let step = Step(next, blend, bottoms, segment(m.a, next - m.t, shares, layers), below);
+        var got = advance(0u, ray, step, layers, m.beam0);
+        m.beam0 = got.beam;
+        upper += got.light.upper;
+        lower += got.light.lower;
         if LIGHT_COUNT > 1u {
-            got = advance(1u, ray, step, layers, &beam1);
-            upper += got.upper;
-            lower += got.lower;
+            got = advance(1u, ray, step, layers, m.beam1);
+            m.beam1 = got.beam;
+            upper += got.light.upper;
+            lower += got.light.lower;
         }
         if LIGHT_COUNT > 2u {
-            got = advance(2u, ray, step, layers, &beam2);
-            upper += got.upper;
-            lower += got.lower;
+            got = advance(2u, ray, step, layers, m.beam2);
+            m.beam2 = got.beam;
+            upper += got.light.upper;
+            lower += got.light.lower;
         }
         if LIGHT_COUNT > 3u {
-            got = advance(3u, ray, step, layers, &beam3);
-            upper += got.upper;
-            lower += got.lower;
+            got = advance(3u, ray, step, layers, m.beam3);
+            m.beam3 = got.beam;
+            upper += got.light.upper;
+            lower += got.light.lower;
         }
-        t = next;
-        a = step.segment.a4;
+        m.t = next;
+        m.a = step.segment.a4;
         below = below_next;
     }
     return Gathered(upper, lower);
+}
+
+fn single_scattering(ray: Ray, unshadowed: f32) -> Gathered {
+    if QUADRATURE == 0u {
+        return by_layer(ray, unshadowed);
+    }
+    return by_step(ray, unshadowed);
 }
 
 // A colour map leaves a layer as it is where it is this bright.

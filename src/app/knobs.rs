@@ -32,11 +32,16 @@ fn subsurface(ui: &mut Ui, surface: &mut SurfaceSection) {
     let name = |quadrature| match quadrature {
         Quadrature::Published => "as published",
         Quadrature::ClosedForm => "closed form",
+        Quadrature::ByLayer => "by layer",
     };
     ComboBox::from_label("quadrature")
         .selected_text(name(surface.quadrature))
         .show_ui(ui, |ui| {
-            for quadrature in [Quadrature::Published, Quadrature::ClosedForm] {
+            for quadrature in [
+                Quadrature::Published,
+                Quadrature::ClosedForm,
+                Quadrature::ByLayer,
+            ] {
                 ui.selectable_value(&mut surface.quadrature, quadrature, name(quadrature));
             }
         });

@@ -45,6 +45,22 @@ pub fn optical_depth(s: f32, cosine: f32, bottoms: Vec3, extinction: &[Vec3; LAY
         .sum()
 }
 
+/// Mean of e^−A over a piece of one layer along which A goes evenly from `a0` to `a1`.
+pub fn mean_transmittance(a0: Vec3, a1: Vec3) -> Vec3 {
+    let mut mean = Vec3::ZERO;
+    for c in 0..3 {
+        let (e0, e1) = ((-a0[c]).exp(), (-a1[c]).exp());
+        let change = a1[c] - a0[c];
+        // Where A hardly changes the quotient loses its digits; there the mean of the ends errs by change²/12.
+        mean[c] = if change.abs() < 0.02 {
+            0.5 * (e0 + e1)
+        } else {
+            (e0 - e1) / change
+        };
+    }
+    mean
+}
+
 /// Share of a segment that lies above each boundary; `start` and `end` are how far its ends lie below them [m].
 pub fn above(start: Vec3, end: Vec3) -> Vec3 {
     let below = start.max(Vec3::ZERO) + end.max(Vec3::ZERO);

@@ -4,6 +4,7 @@ use super::draw::{DepthUse, Draw, DrawKind, Target, cleared, read_depth};
 use super::geometry::GeometryTargets;
 use super::maps::Maps;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join};
+use crate::optics::LAYERS;
 use crate::scene::{Quadrature, SurfaceKind, SurfaceSection};
 
 /// What a surface reads, made by other passes.
@@ -88,10 +89,15 @@ impl Surface {
     ) -> Result<Self, GpuError> {
         let mut constants = inputs.light_constants.to_vec();
         if section.kind == SurfaceKind::Subsurface {
-            let published = section.quadrature == Quadrature::Published;
+            let quadrature = match section.quadrature {
+                Quadrature::ByLayer => 0.0,
+                Quadrature::ClosedForm => 1.0,
+                Quadrature::Published => 2.0,
+            };
             constants.extend([
+                ("QUADRATURE", quadrature),
                 ("SAMPLES", f64::from(section.samples)),
-                ("PUBLISHED", f64::from(u8::from(published))),
+                ("PIECES", f64::from(section.samples.div_ceil(LAYERS as u32))),
             ]);
         }
         let draw = Draw::new(

@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct SurfaceSection {
     /// Which model.
     pub kind: SurfaceKind,
-    /// `subsurface`: places along the view ray where light is gathered.
+    /// `subsurface`: places along the view ray where light is gathered; by layer, rounded up to as many in
+    /// each of the four.
     pub samples: u32,
     /// `subsurface`: how the light between them is summed.
     pub quadrature: Quadrature,
@@ -76,9 +77,11 @@ impl SurfaceKind {
 pub enum Quadrature {
     /// Equal steps, each valued at its start (François 2006, Algorithm 1).
     Published,
-    /// Steps that grow with depth, each integrated in closed form.
-    #[default]
+    /// Steps that grow with depth, each integrated in closed form over the layers in it.
     ClosedForm,
+    /// As many samples in each layer, the last at its end, and the closed form between them.
+    #[default]
+    ByLayer,
 }
 
 /// One layer of tissue.
