@@ -18,7 +18,7 @@ use palpate::geom::tangent::{
     Fans, gradient_max_per_m, point_normals, rest_normals, tangent_frames,
 };
 use palpate::gpu::{Gpu, Timer, read_buffer};
-use palpate::passes::frame::patch_radius_m;
+use palpate::passes::frame::{patch_radius_m, tolerance_m};
 use palpate::passes::light_path::LightPath;
 use palpate::passes::mesh_buffers::MeshBuffers;
 use palpate::passes::plane_carried::planes_in_frames;
@@ -31,14 +31,15 @@ use std::sync::OnceLock;
 const DEGREES_MAX: f64 = 0.05;
 /// Frames of the prod that are recorded: the probe comes, presses, slides and leaves, the grasper pulls.
 const FRAMES: usize = 150;
-/// Frames that are compared: at rest, touched, pressed deepest, slid, let go, pulled.
-const COMPARED: [usize; 6] = [1, 36, 60, 84, 112, 140];
+/// Frames that are compared: at rest, touched, pressed, slid, let go, pulled.
+const COMPARED: [usize; 6] = [1, 36, 56, 84, 112, 140];
 
 /// An organ and where its surface lay in every frame of the prod.
 struct Prodded {
     name: &'static str,
     mesh: SurfaceMesh,
     radius_m: f32,
+    tolerance_m: f32,
     frames: Vec<Vec<Vec3>>,
     /// The patch of each point, by brute force.
     patches: Vec<Vec<usize>>,
@@ -52,7 +53,7 @@ impl Prodded {
             folder: None,
         };
         let scene = Scene::read(&source, sets).expect("a sound scene");
-        let radius_m = patch_radius_m(&scene);
+        let (radius_m, tolerance_m) = (patch_radius_m(&scene), tolerance_m(&scene));
         let mut session = Session::new(scene, 2).expect("a sound body");
         let frames = (0..FRAMES)
             .map(|_| {
@@ -67,8 +68,22 @@ impl Prodded {
             name,
             mesh,
             radius_m,
+            tolerance_m,
             frames,
             patches,
+        }
+    }
+
+    /// The same prod with patches of another reach.
+    fn with_radius(&self, radius_m: f32) -> Self {
+        let rest = surface(&self.mesh, &self.mesh.points);
+        Self {
+            name: self.name,
+            mesh: self.mesh.clone(),
+            radius_m,
+            tolerance_m: self.tolerance_m * radius_m / self.radius_m,
+            frames: self.frames.clone(),
+            patches: oracle::patches(&rest.points, &rest.normals(), f64::from(radius_m)),
         }
     }
 
@@ -181,11 +196,6 @@ impl Passes {
     }
 }
 
-/// The tolerance of a scene that names none: see [`palpate::passes::frame::FramePasses::new`].
-fn default_tolerance_m(organ: &Prodded) -> f32 {
-    organ.radius_m / 2000.0
-}
-
 #[test]
 fn normals_of_a_prodded_organ_are_those_of_f64() {
     for organ in organs() {
@@ -247,10 +257,13 @@ fn tangents_and_texture_gradients_of_a_prodded_organ_are_those_of_f64() {
 
 /// The worst angle and offset error over the compared frames of the prod, played from its start.
 fn worst_over_the_prod(organ: &Prodded, method: LightPathMethod, tolerance_m: f32) -> (f64, f64) {
+    let mut refitted = 0;
     let mut passes = Passes::new(organ, method, tolerance_m);
     let mut worst = (0.0_f64, 0.0_f64);
     for frame in 1..=FRAMES {
         passes.frame(organ.at(frame));
+        let counts = passes.light_path.counts(&passes.gpu);
+        refitted += u64::from(counts.expect("counts can be read").refitted);
         if COMPARED.contains(&frame) {
             let (angle, offset) = organ.plane_errors(organ.at(frame), &passes.planes());
             println!(
@@ -261,6 +274,12 @@ fn worst_over_the_prod(organ: &Prodded, method: LightPathMethod, tolerance_m: f3
             worst = (worst.0.max(angle), worst.1.max(offset));
         }
     }
+    println!(
+        "{}: {} fitted {:.0} % of the planes a frame",
+        organ.name,
+        method.name(),
+        100.0 * refitted as f64 / (FRAMES * organ.mesh.points.len()) as f64
+    );
     worst
 }
 
@@ -268,10 +287,10 @@ fn worst_over_the_prod(organ: &Prodded, method: LightPathMethod, tolerance_m: f3
 fn planes_of_a_prodded_organ_are_those_of_f64() {
     for organ in organs() {
         for method in [LightPathMethod::Full, LightPathMethod::Incremental] {
-            let (angle, offset) = worst_over_the_prod(organ, method, default_tolerance_m(organ));
+            let (angle, offset) = worst_over_the_prod(organ, method, organ.tolerance_m);
             let name = format!("{} of {}", method.name(), organ.name);
             assert!(angle <= DEGREES_MAX, "{name}: {angle} degrees");
-            // The tolerance is 5e-4 of the radius, and the plane lies within what its members may lag.
+            // The tolerance is 2.5e-4 of the radius, and the plane lies within what its members may lag.
             assert!(offset <= 1e-3, "{name}: {offset} of the radius");
         }
     }
@@ -280,7 +299,7 @@ fn planes_of_a_prodded_organ_are_those_of_f64() {
 #[test]
 fn a_tolerance_fifty_times_larger_fails_the_check_of_planes() {
     let organ = organs().last().expect("an organ");
-    let tolerance_m = 50.0 * default_tolerance_m(organ);
+    let tolerance_m = 50.0 * organ.tolerance_m;
     let (angle, _) = worst_over_the_prod(organ, LightPathMethod::Incremental, tolerance_m);
     assert!(
         angle > DEGREES_MAX,
@@ -337,16 +356,13 @@ fn carried_planes_of_a_prodded_organ_are_those_of_their_twin() {
 
 #[test]
 fn incremental_planes_of_a_prodded_organ_do_not_drift_in_ten_thousand_frames() {
-    let organ = organs().last().expect("an organ");
+    // Patches of about 60 points, so that it ends within a minute on a software adapter.
+    let organ = organs().last().expect("an organ").with_radius(0.01);
     assert!(
         organ.mesh.points.len() >= 4000,
         "a surface as fine as an organ's"
     );
-    let mut passes = Passes::new(
-        organ,
-        LightPathMethod::Incremental,
-        default_tolerance_m(organ),
-    );
+    let mut passes = Passes::new(&organ, LightPathMethod::Incremental, organ.tolerance_m);
     // Forwards and backwards, so that every frame is near the one before.
     let period = 2 * (FRAMES - 1);
     for count in 0..10_000 {

@@ -59,17 +59,27 @@ pub fn scene(name: &str) -> Option<&'static str> {
         .map(|(_, text)| *text)
 }
 
+/// Whether `path` names a file inside the binary.
+pub fn is_bundled(path: &Path) -> bool {
+    bundled(path).is_some()
+}
+
+fn bundled(path: &Path) -> Option<&'static [u8]> {
+    let name = path.to_str()?;
+    FILES
+        .iter()
+        .find(|(known, _)| *known == name)
+        .map(|(_, bytes)| *bytes)
+}
+
 /// The bytes of a bundled file, or of a file on disk.
 ///
 /// # Errors
 ///
 /// What the system says about a file that can't be read.
 pub fn read(path: &Path) -> std::io::Result<Cow<'static, [u8]>> {
-    let bundled = path
-        .to_str()
-        .and_then(|name| FILES.iter().find(|(known, _)| *known == name));
-    match bundled {
-        Some((_, bytes)) => Ok(Cow::Borrowed(*bytes)),
+    match bundled(path) {
+        Some(bytes) => Ok(Cow::Borrowed(bytes)),
         None => std::fs::read(path).map(Cow::Owned),
     }
 }

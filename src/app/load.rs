@@ -190,7 +190,10 @@ fn surface(
         meshes: section.meshes.clone(),
     };
     let imported = import::read_surface_bytes(file, &bytes, &options)?;
-    notes.extend(imported.notes);
+    // A bundled surface is as we made it; its textures are in the binary, not beside it.
+    if !assets::is_bundled(file) {
+        notes.extend(imported.notes);
+    }
     let mut mesh = imported.mesh;
     if imported.uv != UvState::Usable {
         notes.push(format!("{}: unwrapped anew", imported.uv));

@@ -119,6 +119,8 @@ struct Shown {
     egui: egui_winit::State,
     egui_renderer: egui_wgpu::Renderer,
     picture: egui::TextureId,
+    /// Textures of the panel that go after the frame.
+    unused_textures: Vec<egui::TextureId>,
     session: Session,
     renderer: Renderer,
     orbit: Orbit,
@@ -269,6 +271,7 @@ impl Shown {
             egui,
             egui_renderer,
             picture,
+            unused_textures: Vec::new(),
             session,
             renderer,
             orbit,
@@ -482,7 +485,7 @@ impl Shown {
             last_tick = Some(tick);
         }
 
-        let (jobs, textures, pixels_per_point) = self.panel()?;
+        let (jobs, pixels_per_point) = self.panel()?;
         let tools = self.session.visible_tools();
         let drawn = self
             .renderer
@@ -495,13 +498,15 @@ impl Shown {
         if std::mem::take(&mut self.state.screenshot) {
             self.screenshot()?;
         }
-        self.present(&jobs, &textures, pixels_per_point)
+        let presented = self.present(&jobs, pixels_per_point);
+        for id in self.unused_textures.drain(..) {
+            self.egui_renderer.free_texture(&id);
+        }
+        presented
     }
 
     /// Runs the panel and does what it asks for.
-    fn panel(
-        &mut self,
-    ) -> Result<(Vec<egui::ClippedPrimitive>, egui::TexturesDelta, f32), AppError> {
+    fn panel(&mut self) -> Result<(Vec<egui::ClippedPrimitive>, f32), AppError> {
         let input = self.egui.take_egui_input(&self.window);
         let context = self.egui.egui_ctx().clone();
         let mut asks = Vec::new();
@@ -516,6 +521,7 @@ impl Shown {
                 &mut asks,
             );
         });
+        self.take_textures(output.textures_delta);
         self.egui
             .handle_platform_output(&self.window, output.platform_output);
         let scale = output.pixels_per_point;
@@ -535,7 +541,20 @@ impl Shown {
             .any(|viewport| viewport.repaint_delay < Duration::from_millis(50));
         self.state.wants_frame |= repaint_soon;
         let jobs = context.tessellate(output.shapes, scale);
-        Ok((jobs, output.textures_delta, scale))
+        Ok((jobs, scale))
+    }
+
+    /// Takes over changed textures of the panel at once: egui tells each change only one time, whether
+    /// or not the window can be drawn to.
+    fn take_textures(&mut self, mut textures: egui::TexturesDelta) {
+        for (id, deltas) in &textures.set {
+            for delta in deltas {
+                self.egui_renderer
+                    .update_texture(&self.gpu.device, &self.gpu.queue, *id, delta);
+            }
+        }
+        self.unused_textures.extend(&textures.free);
+        textures.clear();
     }
 
     /// Makes the picture as large as the place it is shown in.
@@ -634,7 +653,6 @@ impl Shown {
     fn present(
         &mut self,
         jobs: &[egui::ClippedPrimitive],
-        textures: &egui::TexturesDelta,
         pixels_per_point: f32,
     ) -> Result<(), AppError> {
         let frame = match self.surface.get_current_texture() {
@@ -655,12 +673,6 @@ impl Shown {
                 }));
             }
         };
-        for (id, deltas) in &textures.set {
-            for delta in deltas {
-                self.egui_renderer
-                    .update_texture(&self.gpu.device, &self.gpu.queue, *id, delta);
-            }
-        }
         let screen = ScreenDescriptor {
             size_in_pixels: [self.config.width, self.config.height],
             pixels_per_point,
@@ -696,9 +708,6 @@ impl Shown {
             .submit(before.into_iter().chain([encoder.finish()]));
         self.window.pre_present_notify();
         self.gpu.queue.present(frame);
-        for id in &textures.free {
-            self.egui_renderer.free_texture(id);
-        }
         Ok(())
     }
 }

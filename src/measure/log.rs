@@ -125,9 +125,9 @@ mod tests {
         assert_eq!(
             csv(&[first, second]),
             "frame,time_s,wall_ms,sim_ms,tangents_gpu_ms,surface_gpu_ms,cpu_outside_ms,\
-             vertices_refitted,residual_rms,volume_drift,tool_force_n,penetration_m\n\
-             0,0.000000,0,0,0.5,,0,0,0,0,0,0\n\
-             1,0.016667,0,0,0.25,2,0,0,0,0,1.5,0\n"
+             vertices_refitted,residual_rms,volume_drift,tool_force_n,penetration_m,speed_max_m_s\n\
+             0,0.000000,0,0,0.5,,0,0,0,0,0,0,0\n\
+             1,0.016667,0,0,0.25,2,0,0,0,0,1.5,0,0\n"
         );
     }
 

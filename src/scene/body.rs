@@ -157,9 +157,15 @@ impl Region {
 }
 
 impl BodySection {
-    /// Makes relative paths start from `folder`.
+    /// Makes relative paths start from `folder`, where they lead to something; else they may name
+    /// something bundled.
     pub(super) fn resolve_files(&mut self, folder: &Path) {
-        let resolve = |path: &mut PathBuf| *path = folder.join(&*path);
+        let resolve = |path: &mut PathBuf| {
+            let beside = folder.join(&*path);
+            if beside.exists() {
+                *path = beside;
+            }
+        };
         self.file.as_mut().map(resolve);
         if let Some(maps) = &mut self.maps {
             for path in [

@@ -78,7 +78,7 @@ pub struct LightPathSection {
     /// of the first layer (François 2006, section 2.2), and is at least the 16 nearest points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_m: Option<f32>,
-    /// How far a point moves before `incremental` takes notice [m]. Left out, 1/1000 of the radius.
+    /// How far a point moves before `incremental` takes notice [m]. Left out, 1/4000 of the radius.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance_m: Option<f32>,
 }
