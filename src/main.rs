@@ -67,7 +67,7 @@ struct Replay {
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     /// Frames to run instead of the scene's own number.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     frames: Option<u32>,
     /// Size of the pictures instead of the scene's own.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]

@@ -13,9 +13,15 @@ pub fn check(files: &[PathBuf]) -> Result<Outcome, AppError> {
     let mut wrong = 0;
     for file in files {
         match one(file) {
-            Ok(text) => println!("{}", text.trim_end()),
+            Ok(text) => println!("{}\n{}", file.display(), indented(&text)),
             Err(error) => {
-                eprintln!("{}: {error}", file.display());
+                let text = error.to_string();
+                let name = file.display().to_string();
+                if text.contains(&name) {
+                    eprintln!("{text}");
+                } else {
+                    eprintln!("{name}: {text}");
+                }
                 wrong += 1;
             }
         }
@@ -24,6 +30,15 @@ pub fn check(files: &[PathBuf]) -> Result<Outcome, AppError> {
         return Err(AppError::Check { wrong });
     }
     Ok(Outcome::Done)
+}
+
+/// Every line moved in, so that the file's name stands out above it.
+fn indented(text: &str) -> String {
+    text.trim_end()
+        .lines()
+        .map(|line| format!("  {line}"))
+        .collect::<Vec<_>>()
+        .join("\n")
 }
 
 fn one(file: &Path) -> Result<String, AppError> {
@@ -37,15 +52,14 @@ fn one(file: &Path) -> Result<String, AppError> {
     let session = Session::new(scene, 1)?;
     load::maps(&session.scene.body, &session.mesh)?;
     let mut text = format!(
-        "{}: scene, \"{title}\"\n  surface of {} points and {} triangles, {} tetrahedra, {} tools",
-        file.display(),
+        "scene, \"{title}\"\nsurface of {} points and {} triangles, {} tetrahedra, {} tools",
         session.mesh.points.len(),
         session.mesh.triangles.len(),
         session.tet_count(),
         session.scene.tools.len(),
     );
     for note in &session.notes {
-        text.push_str("\n  ");
+        text.push('\n');
         text.push_str(note);
     }
     Ok(text)

@@ -7,6 +7,8 @@ use std::fmt;
 pub enum GpuError {
     /// No adapter, hardware or software.
     NoAdapter(wgpu::RequestAdapterError),
+    /// An adapter that lacks what every WebGPU adapter has.
+    WeakAdapter(String),
     /// The adapter refused a device, mostly for want of memory.
     NoDevice(wgpu::RequestDeviceError),
     /// The joined WGSL of a pass does not compile; `message` has the parser's excerpt.
@@ -36,6 +38,11 @@ impl fmt::Display for GpuError {
                 f,
                 "no GPU adapter: install a driver, or mesa-vulkan-drivers for a software one \
                  (or run `palpate replay SCENE --no-render`, which needs none)"
+            ),
+            Self::WeakAdapter(name) => write!(
+                f,
+                "the GPU adapter {name} lacks storage textures or buffers: install a Vulkan driver, \
+                 or mesa-vulkan-drivers for a software one"
             ),
             Self::NoDevice(_) => write!(f, "the GPU adapter gave no device"),
             Self::Shader { pass, message } => {

@@ -58,7 +58,12 @@ impl Gpu {
 
     /// The entry to the drivers. A window passes its `display`, which some systems need to present.
     pub fn instance(display: Option<Box<dyn wgpu::wgt::WgpuHasDisplayHandle>>) -> wgpu::Instance {
-        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+        // OpenGL lacks what the kernels need, unless somebody insists on it by WGPU_BACKEND.
+        let mut descriptor = wgpu::InstanceDescriptor {
+            backends: wgpu::Backends::PRIMARY,
+            ..wgpu::InstanceDescriptor::new_without_display_handle()
+        }
+        .with_env();
         descriptor.display = display;
         // Indirect dispatches are sized by our own kernels, within what `workgroups` allowed when the
         // pass was made; checking them again is one more dispatch each.
@@ -88,6 +93,9 @@ impl Gpu {
 
     fn with_adapter(adapter: wgpu::Adapter) -> Result<Self, GpuError> {
         let info = adapter.get_info();
+        if !adapter.get_downlevel_capabilities().is_webgpu_compliant() {
+            return Err(GpuError::WeakAdapter(info.name));
+        }
         let has_timestamps = adapter.features().contains(wgpu::Features::TIMESTAMP_QUERY);
         let offered = adapter.limits();
         // WebGPU's default limits, so that what runs here runs anywhere, but buffers as large as

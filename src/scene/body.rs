@@ -156,6 +156,25 @@ impl Region {
     }
 }
 
+impl Region {
+    fn check(&self, key: &str, c: &mut Checker) {
+        for corners in [self.box_m, self.box_share].into_iter().flatten() {
+            c.corners(key, corners);
+        }
+        for ball in [self.sphere_m, self.sphere_share].into_iter().flatten() {
+            c.range3(&format!("{key}.center"), ball.center, -1e6, 1e6);
+            c.range(&format!("{key}.radius"), ball.radius, 0.0, 1e6);
+        }
+        for plane in [self.plane_m, self.plane_share].into_iter().flatten() {
+            c.range3(&format!("{key}.point"), plane.point, -1e6, 1e6);
+            c.range3(&format!("{key}.normal"), plane.normal, -1e6, 1e6);
+            if plane.normal.length() < 1e-6 {
+                c.problem(&format!("{key}.normal"), "it must not be zero");
+            }
+        }
+    }
+}
+
 impl BodySection {
     /// Makes relative paths start from `folder`, where they lead to something; else they may name
     /// something bundled.
@@ -215,6 +234,7 @@ impl BodySection {
                 &given,
                 "box_m, box_share, sphere_m, sphere_share, plane_m, plane_share",
             );
+            region.check(&format!("body.fixed.{index}"), c);
         }
     }
 }

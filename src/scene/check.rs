@@ -31,6 +31,18 @@ impl Checker {
         }
     }
 
+    /// Smallest and largest corner of a box, in this order.
+    pub fn corners(&mut self, key: &str, [low, high]: [glam::Vec3; 2]) {
+        self.range3(key, low, -1e6, 1e6);
+        self.range3(key, high, -1e6, 1e6);
+        if low.cmpgt(high).any() {
+            self.problem(
+                key,
+                "the first corner must be the smaller one on every axis",
+            );
+        }
+    }
+
     /// Says `problem` about `key`.
     pub fn problem(&mut self, key: &str, problem: &str) {
         self.problems.push(format!("{key}: {problem}"));

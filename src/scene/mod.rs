@@ -51,11 +51,7 @@ pub struct Scene {
     #[serde(default)]
     pub light_path: LightPathSection,
     /// What lights it. Without any, a key and a rim light.
-    #[serde(
-        default = "light::default_lights",
-        rename = "light",
-        skip_serializing_if = "Vec::is_empty"
-    )]
+    #[serde(default = "light::default_lights", rename = "light")]
     pub lights: Vec<LightSection>,
     /// Where it is seen from.
     #[serde(default)]
@@ -201,6 +197,19 @@ impl Scene {
                 &given,
                 "nearest_m, nearest_share, mean_box_m, mean_box_share",
             );
+            let key = format!("marker.{index}");
+            for place in [marker.nearest_m, marker.nearest_share]
+                .into_iter()
+                .flatten()
+            {
+                c.range3(&key, place, -1e6, 1e6);
+            }
+            for corners in [marker.mean_box_m, marker.mean_box_share]
+                .into_iter()
+                .flatten()
+            {
+                c.corners(&key, corners);
+            }
         }
         c.range("output.frames", self.output.frames as f32, 1.0, 1e7);
         for side in self.output.size {

@@ -14,12 +14,12 @@ pub(super) fn apply(name: &str, scene: Scene, sets: &[String]) -> Result<Scene, 
             .split_once('=')
             .ok_or_else(|| refuse("write KEY=VALUE, for example solver.substeps=40"))?;
         let path = path.trim();
-        let value = parse(text.trim());
-        let mut table =
-            Table::try_from(&scene).map_err(|e| refuse(&format!("scene has no TOML form: {e}")))?;
-        insert(&mut table, path, value).map_err(|message| refuse(&message))?;
+        let mut root =
+            Value::try_from(&scene).map_err(|e| refuse(&format!("scene has no TOML form: {e}")))?;
+        let steps: Vec<&str> = path.split('.').collect();
+        insert(&mut root, &steps, parse(text.trim())).map_err(|message| refuse(&message))?;
         let before = scene.body.file.clone();
-        scene = Scene::deserialize(table).map_err(|e| refuse(e.to_string().trim_end()))?;
+        scene = Scene::deserialize(root).map_err(|e| refuse(e.to_string().trim_end()))?;
         if path == "body.file" {
             // A file takes the place of a shape, and the maps painted for another surface do not
             // fit its UV map.
@@ -29,6 +29,10 @@ pub(super) fn apply(name: &str, scene: Scene, sets: &[String]) -> Result<Scene, 
                 scene.body.maps = None;
             }
             scene.body.file = scene.body.file.map(|file| from_here(&file));
+        }
+        if path == "body.shape" {
+            scene.body.file = None;
+            scene.body.maps = None;
         }
     }
     Ok(scene)
@@ -52,38 +56,94 @@ fn parse(text: &str) -> Value {
         .unwrap_or_else(|| Value::String(text.to_owned()))
 }
 
-/// Puts `value` at the dotted `path`; a number steps into an array.
-fn insert(table: &mut Table, path: &str, value: Value) -> Result<(), String> {
-    let mut steps: Vec<&str> = path.split('.').collect();
-    let last = steps.pop().filter(|s| !s.is_empty()).ok_or("empty key")?;
-    let mut place = table;
-    let mut steps = steps.into_iter().peekable();
-    while let Some(step) = steps.next() {
-        let next = place
-            .entry(step)
-            .or_insert_with(|| Value::Table(Table::new()));
-        place = match next {
-            Value::Table(inner) => inner,
-            Value::Array(items) => {
-                let count = items.len();
-                let index = steps
-                    .next()
-                    .and_then(|s| s.parse::<usize>().ok())
-                    .filter(|&i| i < count)
-                    .ok_or_else(|| {
-                        format!(
-                            "{step} is a list of {count}: write {step}.0 to {step}.{}",
-                            count.max(1) - 1
-                        )
-                    })?;
-                match &mut items[index] {
-                    Value::Table(inner) => inner,
-                    _ => return Err(format!("{step}.{index} has no keys below it")),
-                }
-            }
-            _ => return Err(format!("{step} has no keys below it")),
-        };
+/// Puts `value` at the place that `steps` lead to; a number steps into a list.
+fn insert(place: &mut Value, steps: &[&str], value: Value) -> Result<(), String> {
+    let Some((step, rest)) = steps.split_first() else {
+        *place = value;
+        return Ok(());
+    };
+    if step.is_empty() {
+        return Err("empty key".to_owned());
     }
-    place.insert(last.to_owned(), value);
-    Ok(())
+    match place {
+        Value::Table(table) => {
+            if rest.is_empty() {
+                forget_alternative(table, step);
+            }
+            let inner = table
+                .entry(*step)
+                .or_insert_with(|| Value::Table(Table::new()));
+            insert(inner, rest, value)
+        }
+        Value::Array(items) => {
+            let count = items.len();
+            let item = step
+                .parse::<usize>()
+                .ok()
+                .and_then(|index| items.get_mut(index))
+                .ok_or_else(|| match count {
+                    0 => format!("the list before {step} is empty"),
+                    _ => format!(
+                        "the list before {step} has {count}: write a number from 0 to {}",
+                        count - 1
+                    ),
+                })?;
+            insert(item, rest, value)
+        }
+        _ => Err(format!("there is no key {step} below a plain value")),
+    }
+}
+
+/// A length in metres takes the place of the same one as a share, and the other way round.
+fn forget_alternative(table: &mut Table, key: &str) {
+    let other = match (key.strip_suffix("_m"), key.strip_suffix("_share")) {
+        (Some(stem), _) => format!("{stem}_share"),
+        (_, Some(stem)) => format!("{stem}_m"),
+        _ => return,
+    };
+    table.remove(&other);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn changed(path: &str, value: &str) -> Result<Value, String> {
+        let mut root: Value = "a = [[1, 2], [3, 4]]\n[t]\nradius_share = 0.1\n[[l]]\nx = 1"
+            .parse::<Table>()
+            .map(Value::Table)
+            .expect("sound TOML");
+        let steps: Vec<&str> = path.split('.').collect();
+        insert(&mut root, &steps, parse(value))?;
+        Ok(root)
+    }
+
+    #[test]
+    fn a_number_steps_into_lists_of_lists() {
+        let root = changed("a.1.0", "9").expect("it is there");
+        assert_eq!(root["a"][1][0].as_integer(), Some(9));
+        assert_eq!(root["a"][1][1].as_integer(), Some(4));
+        let root = changed("l.0", "{ x = 5 }").expect("it is there");
+        assert_eq!(root["l"][0]["x"].as_integer(), Some(5));
+    }
+
+    #[test]
+    fn a_place_that_is_not_there_is_refused_with_what_is() {
+        assert!(changed("a.7", "1").unwrap_err().contains("0 to 1"));
+        assert!(changed("a.1.0.x", "1").unwrap_err().contains('x'));
+        assert!(changed("", "1").is_err());
+    }
+
+    #[test]
+    fn metres_take_the_place_of_a_share() {
+        let root = changed("t.radius_m", "0.02").expect("a table takes keys");
+        assert_eq!(root["t"]["radius_m"].as_float(), Some(0.02));
+        assert!(root["t"].get("radius_share").is_none());
+    }
+
+    #[test]
+    fn a_bare_word_is_a_string() {
+        assert_eq!(parse("gooey"), Value::String("gooey".to_owned()));
+        assert_eq!(parse("[1, 2]").as_array().map(Vec::len), Some(2));
+    }
 }
