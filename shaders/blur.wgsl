@@ -36,9 +36,7 @@ fn pair(at: vec2i, offset: vec2i) -> vec4f {
     return texel(at + offset) + texel(at - offset);
 }
 
-@fragment
-fn blur_fragment(@builtin(position) place: vec4f) -> @location(0) vec4f {
-    let at = vec2i(place.xy);
+fn blurred(at: vec2i) -> vec4f {
     let sum = texel(at)
         + pair(at, blur.taps[0].xy)
         + pair(at, blur.taps[0].zw)
@@ -47,4 +45,9 @@ fn blur_fragment(@builtin(position) place: vec4f) -> @location(0) vec4f {
         + pair(at, blur.taps[2].xy)
         + pair(at, blur.taps[2].zw);
     return sum / 13.0;
+}
+
+@fragment
+fn blur_fragment(@builtin(position) place: vec4f) -> @location(0) vec4f {
+    return blurred(vec2i(place.xy));
 }

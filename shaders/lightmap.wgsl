@@ -8,7 +8,7 @@
 //
 // Source:  Oat 2006, 4.5; Norberg 2010, 2.2.2.
 // Twin:    src/optics/film.rs, fn wrapped
-// Parity:  tests/shading_parity.rs, fn the_light_map_is_bright_where_the_lamp_shines
+// Parity:  tests/shading_parity.rs, fn the_lit_side_is_bright_in_every_model
 // Threads: one a vertex; one a covered texel.
 // Units:   W/m2.
 // Fails:   texture coordinates that overlap, which the importer unwraps anew; shadows finer than a triangle.

@@ -17,8 +17,6 @@ pub enum Binding<'a> {
     Unfiltered(&'a wgpu::TextureView),
     /// `texture_2d<u32>`
     Integers(&'a wgpu::TextureView),
-    /// `texture_2d<u32>`
-    Words(&'a wgpu::TextureView),
     /// `texture_depth_2d`
     Depth(&'a wgpu::TextureView),
     /// `texture_storage_2d<…, write>` of the format given
@@ -48,7 +46,6 @@ impl<'a> Binding<'a> {
             Self::Texture(_) => texture(wgpu::TextureSampleType::Float { filterable: true }),
             Self::Unfiltered(_) => texture(wgpu::TextureSampleType::Float { filterable: false }),
             Self::Integers(_) => texture(wgpu::TextureSampleType::Uint),
-            Self::Words(_) => texture(wgpu::TextureSampleType::Uint),
             Self::Depth(_) => texture(wgpu::TextureSampleType::Depth),
             Self::Image(_, format) => wgpu::BindingType::StorageTexture {
                 access: wgpu::StorageTextureAccess::WriteOnly,
@@ -67,7 +64,6 @@ impl<'a> Binding<'a> {
             }
             Self::Texture(view)
             | Self::Unfiltered(view)
-            | Self::Words(view)
             | Self::Integers(view)
             | Self::Depth(view)
             | Self::Image(view, _) => wgpu::BindingResource::TextureView(view),

@@ -155,8 +155,8 @@ impl Surface {
 fn bindings<'a>(inputs: &SurfaceInputs<'a>) -> [Binding<'a>; 11] {
     [
         Binding::Uniform(inputs.frame),
-        Binding::Words(&inputs.geometry.base.view),
-        Binding::Words(&inputs.geometry.detail.view),
+        Binding::Integers(&inputs.geometry.base.view),
+        Binding::Integers(&inputs.geometry.detail.view),
         Binding::Depth(&inputs.geometry.depth.view),
         Binding::Sampler(&inputs.maps.sampler),
         Binding::Texture(&inputs.maps.outer),

@@ -1,0 +1,893 @@
+//! The shading on the GPU does what its CPU twins do.
+//!
+//! Functions of files without bindings are called over lists of cases by a few lines of compute shader; the march
+//! is called as the surface calls it. Differences are relative, over the range that a scene may ask for.
+
+use glam::{Vec3, Vec4};
+use palpate::geom::SurfaceMesh;
+use palpate::gpu::{
+    Binding, Gpu, Kernel, Wgsl, join, read_buffer, read_texture_rgba16f, storage, uniform,
+};
+use palpate::optics::light_plane::{PlanePair, way_to_light};
+use palpate::optics::march::{Ray, Rule, march, reach_m};
+use palpate::optics::{Layer, blur, film, layers, medium, pack, tone};
+use palpate::passes::draw::Target;
+use palpate::passes::frame::FramePasses;
+use palpate::passes::lightmap::{BlurUniform, LightMap};
+use palpate::passes::surface::Surface;
+use palpate::passes::view::{FrameUniform, View};
+use palpate::scene::{PlacedLight, RestBox, Scene, SceneSource, SurfaceKind, SurfaceSection};
+use palpate::wgsl;
+
+#[allow(dead_code)] // Other tests use the rest.
+#[path = "support/surfaces.rs"]
+mod surfaces;
+
+/// Worst relative difference seen on llvmpipe is 4e-6, of the highlight; the rest is room for fused
+/// multiply-add and a coarser exp.
+const TOLERANCE: f32 = 1e-4;
+
+fn gpu() -> Gpu {
+    Gpu::headless().expect("a GPU adapter; a software one (mesa-vulkan-drivers) will do")
+}
+
+fn sabotaged(source: &str, from: &str, to: &str) -> String {
+    let changed = source.replace(from, to);
+    assert_ne!(changed, source, "the sabotage must change the shader");
+    changed
+}
+
+/// What `body`, WGSL that turns `cases[4 i ..]` into a `vec4f`, makes of four vectors a case.
+fn call(gpu: &Gpu, source: &str, body: &str, cases: &[[Vec4; 4]]) -> Vec<Vec4> {
+    let kernel = format!(
+        "{source}
+        @group(0) @binding(0) var<storage, read> cases: array<vec4f>;
+        @group(0) @binding(1) var<storage, read_write> results: array<vec4f>;
+        @compute @workgroup_size(64)
+        fn main(@builtin(global_invocation_id) id: vec3u) {{
+            let i = id.x;
+            if i >= arrayLength(&results) {{ return; }}
+            let a = cases[4u * i];
+            let b = cases[4u * i + 1u];
+            let c = cases[4u * i + 2u];
+            let d = cases[4u * i + 3u];
+            {body}
+        }}"
+    );
+    let cases_buffer = storage(gpu, "cases", cases).unwrap();
+    let results = storage(gpu, "results", &vec![Vec4::ZERO; cases.len()]).unwrap();
+    let kernel = Kernel::new(
+        gpu,
+        "parity",
+        &[],
+        &kernel,
+        "main",
+        &[Binding::Read(&cases_buffer), Binding::Write(&results)],
+    )
+    .unwrap();
+    dispatch(gpu, &kernel, cases.len());
+    read_buffer(gpu, &results).unwrap()
+}
+
+fn dispatch(gpu: &Gpu, kernel: &Kernel, threads: usize) {
+    let mut encoder = gpu.encoder();
+    {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        kernel.dispatch(&mut pass, threads.div_ceil(64) as u32);
+    }
+    gpu.submit_and_wait(encoder);
+}
+
+/// Worst difference of a component, relative to the larger of it and `floor`.
+fn worst(got: &[Vec4], twin: &[Vec4], floor: f32) -> f32 {
+    assert_eq!(got.len(), twin.len());
+    got.iter()
+        .zip(twin)
+        .flat_map(|(g, t)| {
+            (0..4).map(move |c| {
+                let difference = (g[c] - t[c]).abs() / t[c].abs().max(floor);
+                if difference.is_nan() {
+                    f32::INFINITY
+                } else {
+                    difference
+                }
+            })
+        })
+        .fold(0.0, f32::max)
+}
+
+/// Repeatable numbers from 0 to 1.
+struct Numbers(u32);
+
+impl Numbers {
+    fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (self.0 >> 8) as f32 / (1 << 24) as f32
+    }
+
+    fn between(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * self.next()
+    }
+
+    fn direction(&mut self) -> Vec3 {
+        loop {
+            let v = Vec3::from_array([(); 3].map(|()| self.between(-1.0, 1.0)));
+            if (0.01..1.0).contains(&v.length_squared()) {
+                return v.normalize();
+            }
+        }
+    }
+}
+
+/// 500 cases made by `make`: a workgroup and a rest.
+fn cases(make: impl Fn(&mut Numbers) -> [Vec4; 4]) -> Vec<[Vec4; 4]> {
+    let mut numbers = Numbers(7);
+    (0..500).map(|_| make(&mut numbers)).collect()
+}
+
+// Medium.
+
+const MEDIUM: &[Wgsl] = wgsl!["medium.wgsl"];
+
+fn phase_difference(gpu: &Gpu, source: &str) -> f32 {
+    let cases = cases(|n| {
+        let k = Vec4::new(n.between(-0.9, 0.9), 0.0, -0.9, 0.9);
+        [Vec4::splat(n.between(-1.0, 1.0)), k, Vec4::ZERO, Vec4::ZERO]
+    });
+    let twin: Vec<Vec4> = cases
+        .iter()
+        .map(|[a, b, ..]| Vec4::from_array(b.to_array().map(|k| medium::phase(a.x, k))))
+        .collect();
+    let body = "results[i] = vec4f(phase(a.x, b.x), phases(a.x, b).yzw);";
+    worst(&call(gpu, source, body, &cases), &twin, 1e-6)
+}
+
+#[test]
+fn medium_functions_match_the_cpu_twin() {
+    let gpu = gpu();
+    let source = join(MEDIUM);
+    let difference = phase_difference(&gpu, &source);
+    assert!(difference < TOLERANCE, "phase differs by {difference}");
+
+    let extinction = [100.0, 900.0, 2500.0, 400.0].map(Vec3::splat);
+    let layers = "Layers(vec3f(100.0), vec3f(900.0), vec3f(2500.0), vec3f(400.0))";
+    let ascending = |n: &mut Numbers| {
+        let mut bottom = 0.0;
+        Vec3::from_array([(); 3].map(|()| {
+            bottom += n.between(0.0, 0.002);
+            bottom
+        }))
+    };
+    // s, cosine | bottoms
+    let paths = cases(|n| {
+        let path = Vec4::new(n.between(0.0, 0.01), n.between(-0.2, 1.0), 0.0, 0.0);
+        [path, ascending(n).extend(0.0), Vec4::ZERO, Vec4::ZERO]
+    });
+    let got = call(
+        &gpu,
+        &source,
+        &format!("results[i] = vec4f(optical_depth(a.x, a.y, b.xyz, {layers}), 0.0);"),
+        &paths,
+    );
+    let twin: Vec<Vec4> = paths
+        .iter()
+        .map(|[a, b, ..]| medium::optical_depth(a.x, a.y, b.truncate(), &extinction).extend(0.0))
+        .collect();
+    let difference = worst(&got, &twin, 1e-3);
+    assert!(
+        difference < TOLERANCE,
+        "optical depth differs by {difference}"
+    );
+
+    // a0, length, before, after | starts of the segment below the boundaries | its ends
+    let segments = cases(|n| {
+        let deep = ascending(n);
+        let [start, end] = [(); 2].map(|()| n.between(0.0, 0.004));
+        let after = if n.next() < 0.2 {
+            medium::UNLIT
+        } else {
+            n.between(0.0, 8.0)
+        };
+        [
+            Vec4::new(
+                n.between(0.0, 4.0),
+                n.between(1e-6, 0.006),
+                n.between(0.0, 8.0),
+                after,
+            ),
+            (start - deep).extend(0.0),
+            (end - deep).extend(0.0),
+            Vec4::ZERO,
+        ]
+    });
+    let sources = [0.3, 0.5, 0.7, 0.9].map(Vec3::splat);
+    let begin = format!(
+        "let s = segment(vec3f(a.x), a.y, above(b.xyz, c.xyz), {layers});
+        let sources = Layers(vec3f(0.3), vec3f(0.5), vec3f(0.7), vec3f(0.9));"
+    );
+    let got = call(
+        &gpu,
+        &source,
+        &format!(
+            "{begin}
+            let g = gather(s, vec3f(a.z), vec3f(a.w), sources);
+            let p = gather_at_start(s, vec3f(a.z), b.xyz, sources);
+            results[i] = vec4f(g.upper.x, g.lower.y, p.upper.z + p.lower.z, s.a4.x);"
+        ),
+        &segments,
+    );
+    let twin: Vec<Vec4> = segments
+        .iter()
+        .map(|[a, b, c, _]| {
+            let below = b.truncate();
+            let shares = medium::above(below, c.truncate());
+            let s = medium::segment(Vec3::splat(a.x), a.y, shares, &extinction);
+            let (before, after) = (Vec3::splat(a.z), Vec3::splat(a.w));
+            let g = medium::gather(&s, before, after, &sources);
+            let p = medium::gather_at_start(&s, before, below, &sources);
+            Vec4::new(
+                (g[0] + g[1]).x,
+                (g[2] + g[3]).y,
+                p.iter().sum::<Vec3>().z,
+                s[4].x,
+            )
+        })
+        .collect();
+    // Differences of exponentials lose digits where little is left: below 1e-3 of the light they count as that.
+    let difference = worst(&got, &twin, 1e-3);
+    assert!(difference < 1e-3, "a segment differs by {difference}");
+}
+
+#[test]
+fn medium_parity_check_rejects_the_wrong_sign_of_the_asymmetry() {
+    let source = sabotaged(&join(MEDIUM), "1.0 + k * cos_angle", "1.0 - k * cos_angle");
+    let difference = phase_difference(&gpu(), &source);
+    assert!(
+        difference > 0.5,
+        "backwards scattering went unnoticed: {difference}"
+    );
+}
+
+// Light planes.
+
+fn light_plane_difference(gpu: &Gpu, source: &str) -> f32 {
+    // N·n, N·eye, n·eye, h | t, blend, N·light, n·light
+    let cases = cases(|n| {
+        let normal = n.direction();
+        let plane = (normal + 0.7 * n.direction()).normalize();
+        let (to_eye, to_light) = (n.direction(), n.direction());
+        [
+            Vec4::new(
+                normal.dot(plane),
+                normal.dot(to_eye),
+                plane.dot(to_eye),
+                n.between(-0.001, 0.001),
+            ),
+            Vec4::new(
+                n.between(0.0, 0.01),
+                n.next(),
+                normal.dot(to_light),
+                plane.dot(to_light),
+            ),
+            Vec4::ZERO,
+            Vec4::ZERO,
+        ]
+    });
+    let body = "let way = way_to_light(PlanePair(a.x, a.y, a.z, a.w), b.x, b.y, b.z, b.w);
+        results[i] = vec4f(way, 0.0, 0.0);";
+    let twin: Vec<Vec4> = cases
+        .iter()
+        .map(|[a, b, ..]| {
+            let pair = PlanePair {
+                normals: a.x,
+                tangent_eye: a.y,
+                plane_eye: a.z,
+                offset_m: a.w,
+            };
+            let (s, cosine) = way_to_light(&pair, b.x, b.y, b.z, b.w).unwrap_or((0.0, 0.0));
+            Vec4::new(s, cosine, 0.0, 0.0)
+        })
+        .collect();
+    worst(&call(gpu, source, body, &cases), &twin, 1e-5)
+}
+
+#[test]
+fn light_planes_match_the_cpu_twin() {
+    let difference = light_plane_difference(&gpu(), &join(wgsl!["light_plane.wgsl"]));
+    // A way that starts on the plane is a difference of lengths: 1e-3 of 10 micrometres is 10 nanometres.
+    assert!(difference < 1e-3, "differ by {difference}");
+}
+
+#[test]
+fn light_plane_parity_check_rejects_an_offset_without_its_sign() {
+    let source = join(wgsl!["light_plane.wgsl"]);
+    let source = sabotaged(
+        &source,
+        "blend * pair.offset *",
+        "blend * abs(pair.offset) *",
+    );
+    assert!(light_plane_difference(&gpu(), &source) > 0.1);
+}
+
+// Parallax.
+
+fn parallax_difference(gpu: &Gpu, source: &str) -> f32 {
+    // to eye | relief | normal | distance
+    let cases = cases(|n| {
+        let normal = n.direction();
+        let relief = (normal + 0.4 * n.direction()).normalize();
+        let side = n.direction();
+        let to_eye = if side.dot(normal) < 0.0 { -side } else { side };
+        [
+            to_eye.extend(0.0),
+            relief.extend(0.0),
+            normal.extend(0.0),
+            Vec4::splat(n.between(0.0, 0.005)),
+        ]
+    });
+    let body = "results[i] = transmission(a.xyz, b.xyz, c.xyz, d.x);";
+    let twin: Vec<Vec4> = cases
+        .iter()
+        .map(|[a, b, c, d]| {
+            let (step, way) = layers::transmission(a.truncate(), b.truncate(), c.truncate(), d.x);
+            step.extend(way)
+        })
+        .collect();
+    worst(&call(gpu, source, body, &cases), &twin, 1e-3)
+}
+
+#[test]
+fn parallax_matches_the_cpu_twin() {
+    let difference = parallax_difference(&gpu(), &join(wgsl!["layers.wgsl"]));
+    assert!(difference < TOLERANCE, "differ by {difference}");
+}
+
+#[test]
+fn parallax_parity_check_rejects_a_way_that_leaves_the_body() {
+    let source = join(wgsl!["layers.wgsl"]);
+    let source = sabotaged(&source, "mirrored - 2.0 *", "mirrored - 0.0 *");
+    assert!(parallax_difference(&gpu(), &source) > 0.1);
+}
+
+// Film.
+
+fn film_difference(gpu: &Gpu, source: &str) -> f32 {
+    // normal, roughness | to light, wrap | to eye, cosine
+    let cases = cases(|n| {
+        let normal = n.direction();
+        let facing = |d: Vec3| if d.dot(normal) < 0.0 { -d } else { d };
+        [
+            normal.extend(n.between(0.05, 1.0)),
+            facing(n.direction()).extend(n.next()),
+            facing(n.direction()).extend(n.between(-1.0, 1.0)),
+            Vec4::ZERO,
+        ]
+    });
+    let body = "results[i] = vec4f(
+            fresnel(c.w),
+            highlight(a.xyz, b.xyz, c.xyz, a.w),
+            wrapped(c.w, vec3f(b.w)).y,
+            0.0,
+        );";
+    let twin: Vec<Vec4> = cases
+        .iter()
+        .map(|[a, b, c, _]| {
+            let [normal, to_light, to_eye] = [a, b, c].map(|v| v.truncate());
+            Vec4::new(
+                film::fresnel(c.w),
+                film::highlight(normal, to_light, to_eye, a.w),
+                film::wrapped(c.w, b.w),
+                0.0,
+            )
+        })
+        .collect();
+    worst(&call(gpu, source, body, &cases), &twin, 1e-5)
+}
+
+#[test]
+fn film_matches_the_cpu_twin() {
+    let difference = film_difference(&gpu(), &join(wgsl!["film.wgsl"]));
+    assert!(difference < 1e-3, "differ by {difference}");
+}
+
+#[test]
+fn film_parity_check_rejects_a_roughness_that_is_not_squared() {
+    let source = join(wgsl!["film.wgsl"]);
+    let source = sabotaged(
+        &source,
+        "let a = roughness * roughness;",
+        "let a = roughness;",
+    );
+    assert!(film_difference(&gpu(), &source) > 0.1);
+}
+
+// Packed directions.
+
+fn packed_difference(gpu: &Gpu, source: &str) -> f32 {
+    let cases = cases(|n| {
+        [
+            n.direction().extend(0.0),
+            Vec4::ZERO,
+            Vec4::ZERO,
+            Vec4::ZERO,
+        ]
+    });
+    let body = "results[i] = vec4f(from_octahedral(octahedral(3.0 * a.xyz)), 0.0);";
+    let twin: Vec<Vec4> = cases
+        .iter()
+        .map(|[a, ..]| pack::from_octahedral(pack::octahedral(a.truncate())).extend(0.0))
+        .collect();
+    worst(&call(gpu, source, body, &cases), &twin, 1.0)
+}
+
+#[test]
+fn packed_directions_match_the_cpu_twin() {
+    let difference = packed_difference(&gpu(), &join(wgsl!["pack.wgsl"]));
+    // A step of 16 bits is 3e-5; where a coordinate lies between two, rounding may differ.
+    assert!(difference < 1e-4, "differ by {difference}");
+}
+
+#[test]
+fn packed_parity_check_rejects_a_lower_half_that_is_not_folded() {
+    let source = join(wgsl!["pack.wgsl"]);
+    let source = sabotaged(&source, "if direction.z < 0.0 {", "if direction.z < -2.0 {");
+    assert!(packed_difference(&gpu(), &source) > 0.1);
+}
+
+// Tone map.
+
+fn tone_difference(gpu: &Gpu, source: &str) -> f32 {
+    let cases = cases(|n| {
+        let light = Vec3::from_array([(); 3].map(|()| 10.0_f32.powf(n.between(-6.0, 3.0)) - 1e-4));
+        [light.extend(0.0), Vec4::ZERO, Vec4::ZERO, Vec4::ZERO]
+    });
+    let body = "results[i] = vec4f(displayed(a.xyz), 0.0);";
+    let twin: Vec<Vec4> = cases
+        .iter()
+        .map(|[a, ..]| tone::displayed(a.truncate()).extend(0.0))
+        .collect();
+    worst(&call(gpu, source, body, &cases), &twin, 0.01)
+}
+
+#[test]
+fn tone_map_matches_the_cpu_twin() {
+    let difference = tone_difference(&gpu(), &join(wgsl!["tone.wgsl"]));
+    // A tenth of a step of 8 bits; llvmpipe's power is good to 1e-5.
+    assert!(difference < 4e-4, "differ by {difference}");
+}
+
+#[test]
+fn tone_map_parity_check_rejects_a_missing_srgb_curve() {
+    let source = join(wgsl!["tone.wgsl"]);
+    let source = sabotaged(
+        &source,
+        "return encoded(filmic(radiance));",
+        "return filmic(radiance);",
+    );
+    assert!(tone_difference(&gpu(), &source) > 0.1);
+}
+
+// Blur.
+
+fn blur_difference(gpu: &Gpu, source: &str) -> f32 {
+    const SIZE: usize = 32;
+    let mut numbers = Numbers(3);
+    // Halves hold these eighths exactly.
+    let map: Vec<f32> = (0..SIZE * SIZE)
+        .map(|_| (64.0 * numbers.next()).floor() / 8.0)
+        .collect();
+    let taps = blur::taps(5.5, 0.7);
+    let target = Target::new(
+        gpu,
+        "light map",
+        [SIZE as u32; 2],
+        wgpu::TextureFormat::Rgba32Float,
+    );
+    let texels: Vec<[f32; 4]> = map.iter().map(|&light| [light; 4]).collect();
+    gpu.queue.write_texture(
+        target.texture.as_image_copy(),
+        bytemuck::cast_slice(&texels),
+        wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(16 * SIZE as u32),
+            rows_per_image: None,
+        },
+        target.texture.size(),
+    );
+    let kernel = format!(
+        "{source}
+        @group(0) @binding(2) var<storage, read_write> results: array<vec4f>;
+        @compute @workgroup_size(64)
+        fn main(@builtin(global_invocation_id) id: vec3u) {{
+            results[id.x] = blurred(vec2i(vec2u(id.x % {SIZE}u, id.x / {SIZE}u)));
+        }}"
+    );
+    let results = storage(gpu, "results", &vec![Vec4::ZERO; map.len()]).unwrap();
+    let kernel = Kernel::new(
+        gpu,
+        "blur parity",
+        &[],
+        &kernel,
+        "main",
+        &[
+            Binding::Uniform(&uniform(gpu, "taps", &BlurUniform { taps })),
+            Binding::Unfiltered(&target.view),
+            Binding::Write(&results),
+        ],
+    )
+    .unwrap();
+    dispatch(gpu, &kernel, map.len());
+    let twin: Vec<Vec4> = blur::blurred(&map, SIZE, &taps)
+        .into_iter()
+        .map(Vec4::splat)
+        .collect();
+    worst(&read_buffer(gpu, &results).unwrap(), &twin, 1.0)
+}
+
+#[test]
+fn blur_matches_the_cpu_twin() {
+    let difference = blur_difference(&gpu(), &join(LightMap::BLUR_WGSL));
+    assert!(difference < TOLERANCE, "differ by {difference}");
+}
+
+#[test]
+fn blur_parity_check_rejects_taps_without_their_opposites() {
+    let source = sabotaged(
+        &join(LightMap::BLUR_WGSL),
+        "texel(at + offset) + texel(at - offset)",
+        "2.0 * texel(at + offset)",
+    );
+    assert!(blur_difference(&gpu(), &source) > 0.1);
+}
+
+// The march, as the surface calls it.
+
+/// Layer map: the same boundaries everywhere, as bytes.
+const BOUNDARIES: [u8; 4] = [26, 51, 128, 255];
+
+fn section() -> SurfaceSection {
+    SurfaceSection {
+        layer_depth_max_m: 0.005,
+        ..SurfaceSection::default()
+    }
+}
+
+fn far_light(toward: Vec3) -> PlacedLight {
+    PlacedLight {
+        place: toward,
+        is_point: false,
+        power: Vec3::ONE,
+        shadow: false,
+    }
+}
+
+/// Worst difference of the march by `rule` from its twin, relative to the brightest case.
+fn march_difference(gpu: &Gpu, source: &str, rule: Rule, samples: u32) -> f32 {
+    let section = section();
+    let to_light = Vec3::new(0.3, 0.5, 0.8).normalize();
+    let view = View {
+        eye: Vec3::Z,
+        target: Vec3::ZERO,
+        fov_y: 0.5,
+    };
+    let frame = FrameUniform::new(
+        &view,
+        [64; 2],
+        &[far_light(to_light)],
+        &section,
+        glam::Mat4::IDENTITY,
+        1.0,
+    );
+    let quadrature = match rule {
+        Rule::ByLayer => 0,
+        Rule::ClosedForm => 1,
+        Rule::Published => 2,
+    };
+    let source = source
+        .replace(
+            "override QUADRATURE: u32 = 0u;",
+            &format!("const QUADRATURE: u32 = {quadrature}u;"),
+        )
+        .replace(
+            "override SAMPLES: u32 = 4u;",
+            &format!("const SAMPLES: u32 = {samples}u;"),
+        )
+        .replace(
+            "override PIECES: u32 = 1u;",
+            &format!("const PIECES: u32 = {}u;", samples.div_ceil(4)),
+        );
+    let kernel = format!(
+        "{source}
+        @group(0) @binding(11) var<storage, read> cases: array<vec4f>;
+        @group(0) @binding(12) var<storage, read_write> results: array<vec4f>;
+        @compute @workgroup_size(64)
+        fn main(@builtin(global_invocation_id) id: vec3u) {{
+            let i = id.x;
+            if i >= arrayLength(&results) {{ return; }}
+            let normal = cases[4u * i].xyz;
+            let plane = cases[4u * i + 1u];
+            let to_eye = cases[4u * i + 2u].xyz;
+            let pair = PlanePair(
+                dot(normal, plane.xyz), dot(normal, to_eye), dot(plane.xyz, to_eye), plane.w);
+            let ray = Ray(vec3f(0.0), normal, plane.xyz, to_eye, pair, vec2f(0.5), vec2f(0.0));
+            let got = single_scattering(ray, 1.0);
+            results[i] = vec4f(got.upper + got.lower, 0.0);
+        }}"
+    );
+    // normal | plane, offset | to eye
+    let cases = cases(|n| {
+        let normal = (to_light + 0.9 * n.direction()).normalize();
+        let plane = (normal + 0.3 * n.direction()).normalize();
+        let side = n.direction();
+        let to_eye = if side.dot(normal) < 0.05 {
+            (normal + 0.5 * side).normalize()
+        } else {
+            side
+        };
+        [
+            normal.extend(0.0),
+            plane.extend(n.between(-5e-4, 5e-4)),
+            to_eye.extend(0.0),
+            Vec4::ZERO,
+        ]
+    });
+    let twin: Vec<Vec4> = cases
+        .iter()
+        .map(|[a, b, c, _]| {
+            twin_of_march(
+                a.truncate(),
+                *b,
+                c.truncate(),
+                to_light,
+                &section,
+                rule,
+                samples,
+            )
+        })
+        .collect();
+
+    let rgba8 = wgpu::TextureFormat::Rgba8Unorm;
+    let image = Target::new(gpu, "any map", [4; 2], rgba8);
+    gpu.queue.write_texture(
+        image.texture.as_image_copy(),
+        &BOUNDARIES.repeat(16),
+        wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(16),
+            rows_per_image: None,
+        },
+        image.texture.size(),
+    );
+    let words = Target::new(gpu, "no words", [1; 2], wgpu::TextureFormat::Rgba32Uint);
+    let depth = Target::new(gpu, "no depth", [1; 2], wgpu::TextureFormat::Depth32Float);
+    let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+        mag_filter: wgpu::FilterMode::Linear,
+        ..Default::default()
+    });
+    let cases_buffer = storage(gpu, "cases", &cases).unwrap();
+    let results = storage(gpu, "results", &vec![Vec4::ZERO; cases.len()]).unwrap();
+    let kernel = Kernel::new(
+        gpu,
+        "march parity",
+        &[],
+        &kernel,
+        "main",
+        &[
+            Binding::Uniform(&uniform(gpu, "frame", &frame)),
+            Binding::Integers(&words.view),
+            Binding::Integers(&words.view),
+            Binding::Depth(&depth.view),
+            Binding::Sampler(&sampler),
+            Binding::Texture(&image.view),
+            Binding::Texture(&image.view),
+            Binding::Texture(&image.view),
+            Binding::Texture(&image.view),
+            Binding::Texture(&image.view),
+            Binding::Depth(&depth.view),
+            Binding::Read(&cases_buffer),
+            Binding::Write(&results),
+        ],
+    )
+    .unwrap();
+    dispatch(gpu, &kernel, cases.len());
+    let brightest = twin.iter().map(|v| v.max_element()).fold(0.0, f32::max);
+    worst(
+        &read_buffer(gpu, &results).unwrap(),
+        &twin,
+        0.01 * brightest,
+    )
+}
+
+fn twin_of_march(
+    normal: Vec3,
+    plane: Vec4,
+    to_eye: Vec3,
+    to_light: Vec3,
+    section: &SurfaceSection,
+    rule: Rule,
+    samples: u32,
+) -> Vec4 {
+    let layers: [Layer; 4] = section.layers.map(Layer::from);
+    let clearest = layers
+        .iter()
+        .map(|layer| layer.extinction_per_m().min_element())
+        .fold(f32::INFINITY, f32::min);
+    let plane_normal = plane.truncate();
+    let ray = Ray {
+        pair: PlanePair {
+            normals: normal.dot(plane_normal),
+            tangent_eye: normal.dot(to_eye),
+            plane_eye: plane_normal.dot(to_eye),
+            offset_m: plane.w,
+        },
+        tangent_light: normal.dot(to_light),
+        plane_light: plane_normal.dot(to_light),
+        light_eye: to_light.dot(to_eye),
+        reach_m: reach_m(
+            section.layer_depth_max_m,
+            normal.dot(to_eye),
+            8.0 / clearest,
+        ),
+    };
+    let [r, g, b, _] = BOUNDARIES.map(|byte| section.layer_depth_max_m * f32::from(byte) / 255.0);
+    march(&ray, &layers, |_| Vec3::new(r, g, b), samples, rule).extend(0.0)
+}
+
+#[test]
+fn march_matches_the_cpu_twin() {
+    let gpu = gpu();
+    let source = join(Surface::wgsl(SurfaceKind::Subsurface));
+    for (rule, samples) in [
+        (Rule::ByLayer, 4),
+        (Rule::ByLayer, 8),
+        (Rule::ClosedForm, 1),
+        (Rule::ClosedForm, 10),
+        (Rule::Published, 23),
+    ] {
+        let difference = march_difference(&gpu, &source, rule, samples);
+        // Sums of differences of exponentials. (A published sample on a boundary would be in either layer: 23
+        // equal steps have none there.)
+        assert!(
+            difference < 2e-3,
+            "{rule:?} with {samples}: differ by {difference}"
+        );
+    }
+}
+
+#[test]
+fn march_parity_check_rejects_planes_blended_the_wrong_way_round() {
+    // François' Algorithm 2 against his eq. 9.
+    let source = sabotaged(
+        &join(Surface::wgsl(SurfaceKind::Subsurface)),
+        "let rest = 1.0 - blend;",
+        "let rest = blend;",
+    );
+    let difference = march_difference(&gpu(), &source, Rule::ClosedForm, 10);
+    assert!(
+        difference > 0.02,
+        "swapped planes went unnoticed: {difference}"
+    );
+}
+
+// Whole frames.
+
+/// Radiance of a lit ball, drawn small, and whether each pixel is covered.
+fn ball(gpu: &Gpu, kind: &str, sets: &[&str], light: &str) -> Vec<Vec4> {
+    let mesh = surfaces::sphere(0.05, 48, 31);
+    let size_px = 32;
+    let map = |texel: [u8; 4]| image::RgbaImage::from_pixel(size_px, size_px, image::Rgba(texel));
+    let tissue = palpate::geom::paint::TissueMaps {
+        size_px,
+        outer: map([170, 80, 60, 128]),
+        normal: map([128, 128, 255, 255]),
+        inner: map([140, 40, 30, 255]),
+        layers: map(BOUNDARIES),
+    };
+    let text = format!(
+        "[body]\nshape = \"sphere\"\nextent_m = [0.1, 0.1, 0.1]\n[surface]\nkind = \"{kind}\"\n\
+         [light_path]\nmethod = \"tangent\"\n[[light]]\n{light}\nirradiance_w_m2 = [3.0, 3.0, 3.0]\n"
+    );
+    let source = SceneSource {
+        name: "ball",
+        text: &text,
+        folder: None,
+    };
+    let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
+    let scene = Scene::read(&source, &sets).expect("a sound scene");
+    let (low, high) = palpate::geom::bounds(&mesh.points);
+    let rest = RestBox { low, high };
+    let passes = FramePasses::new(gpu, &scene, &rest, &mesh, &tissue, [64, 64]).unwrap();
+    let view = View {
+        eye: Vec3::new(0.0, 0.0, 0.4),
+        target: Vec3::ZERO,
+        fov_y: 0.3,
+    };
+    let mut timer = palpate::gpu::Timer::new(gpu, 16);
+    let mut encoder = gpu.encoder();
+    passes.record(gpu, &mesh.points, &view, &[], &mut encoder, &mut timer);
+    gpu.submit_and_wait(encoder);
+    read_texture_rgba16f(gpu, &passes.radiance.texture)
+        .unwrap()
+        .chunks_exact(4)
+        .map(Vec4::from_slice)
+        .collect()
+}
+
+/// Mean brightness of the covered pixels of the left and the right half.
+fn halves(pixels: &[Vec4]) -> [f32; 2] {
+    [0, 1].map(|half| {
+        let side: Vec<f32> = pixels
+            .iter()
+            .enumerate()
+            .filter(|(i, pixel)| (i % 64) / 32 == half && pixel.w > 0.0)
+            .map(|(_, pixel)| pixel.truncate().element_sum())
+            .collect();
+        assert!(side.len() > 200, "half a ball is covered");
+        side.iter().sum::<f32>() / side.len() as f32
+    })
+}
+
+#[test]
+fn the_lit_side_is_bright_in_every_model() {
+    let gpu = gpu();
+    for kind in ["plain", "subsurface", "gooey"] {
+        for light in ["toward = [1.0, 0.2, 0.0]", "at_m = [0.12, 0.0, 0.0]"] {
+            let pixels = ball(&gpu, kind, &[], light);
+            assert!(pixels.iter().all(|pixel| pixel.is_finite()), "{kind}");
+            let [left, right] = halves(&pixels);
+            assert!(right > 3.0 * left, "{kind}, {light}: {left} and {right}");
+        }
+    }
+}
+
+#[test]
+fn a_lit_ball_casts_no_shadow_on_its_lit_side() {
+    let gpu = gpu();
+    let light = "toward = [0.3, 0.4, 1.0]";
+    for kind in ["plain", "subsurface", "gooey"] {
+        let bare = ball(&gpu, kind, &[], light);
+        let shadowed = ball(&gpu, kind, &[], &format!("{light}\nshadow = true"));
+        let total =
+            |pixels: &[Vec4]| -> f32 { pixels.iter().map(|p| p.truncate().element_sum()).sum() };
+        let (bare, shadowed) = (total(&bare), total(&shadowed));
+        // What lies past the terminator gets its light through the body, so a little more or less.
+        assert!(
+            (shadowed / bare - 1.0).abs() < 0.06,
+            "{kind}: {bare} and {shadowed}"
+        );
+    }
+}
+
+#[test]
+fn more_samples_by_layer_and_in_closed_form_end_at_the_same_picture() {
+    let gpu = gpu();
+    let light = "toward = [0.3, 0.4, 1.0]";
+    let exact = ball(
+        &gpu,
+        "subsurface",
+        &["surface.samples=48", "surface.quadrature=closed-form"],
+        light,
+    );
+    let coarse = ball(&gpu, "subsurface", &["surface.samples=4"], light);
+    let papers = ball(
+        &gpu,
+        "subsurface",
+        &["surface.samples=10", "surface.quadrature=published"],
+        light,
+    );
+    let error = |pixels: &[Vec4]| {
+        let [sum, norm] = pixels
+            .iter()
+            .zip(&exact)
+            .fold([0.0_f32; 2], |[sum, norm], (a, b)| {
+                [
+                    sum + (*a - *b).length_squared(),
+                    norm + b.truncate().length_squared(),
+                ]
+            });
+        (sum / norm).sqrt()
+    };
+    // Half floats are good to 5e-4.
+    assert!(error(&coarse) < 0.01, "{}", error(&coarse));
+    assert!(error(&papers) > 5.0 * error(&coarse), "{}", error(&papers));
+}
