@@ -4,7 +4,7 @@
 //
 // Source:  Williams, "Casting Curved Shadows on Curved Surfaces", SIGGRAPH 1978.
 // Twin:    src/passes/view.rs, fn shadow_from_world
-// Parity:  tests/shading_parity.rs, fn a_lit_ball_casts_no_shadow_on_its_lit_side
+// Parity:  tests/replay.rs, fn a_shadow_falls_where_the_way_to_the_lamp_is_blocked
 // Threads: one a vertex.
 // Units:   metres in, clip space out.
 // Fails:   details finer than a texel.

@@ -25,6 +25,8 @@ pub enum AppError {
     Lattice(LatticeError),
     /// A texture map.
     Map { path: String, message: String },
+    /// Options that don't go together.
+    Usage(String),
     /// The body or its script can't be used as the scene describes it.
     Body(String),
     /// The GPU or a pass.
@@ -49,6 +51,7 @@ impl fmt::Display for AppError {
             Self::Import(e) => e.fmt(f),
             Self::Lattice(e) => e.fmt(f),
             Self::Map { path, message } => write!(f, "texture {path}: {message}"),
+            Self::Usage(message) => f.write_str(message),
             Self::Body(message) => write!(f, "body: {message}"),
             Self::Gpu(e) => e.fmt(f),
             Self::File(e) => e.fmt(f),

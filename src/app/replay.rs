@@ -7,7 +7,7 @@ use crate::gpu::Gpu;
 use crate::measure::against::compare_runs;
 use crate::measure::files::{create_folder, write};
 use crate::measure::pictures::PictureTolerance;
-use crate::measure::states::Nearness;
+use crate::measure::states::{Nearness, States};
 use crate::scene::Scene;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
@@ -77,14 +77,17 @@ pub fn replay(options: &ReplayOptions) -> Result<Outcome, AppError> {
     scene.output.png_every = options.png_every.unwrap_or(scene.output.png_every);
     let frames = scene.output.frames;
     if let Some(late) = options.dumps.iter().find(|&&frame| frame > frames) {
-        return Err(AppError::Body(format!(
+        return Err(AppError::Usage(format!(
             "--dump {late} is past the last frame, {frames}"
         )));
     }
     if !options.render && !options.dumps.is_empty() {
-        return Err(AppError::Body(
+        return Err(AppError::Usage(
             "--dump writes what the shaders made, so it can't go with --no-render".to_owned(),
         ));
+    }
+    if let Some(recorded) = &options.against {
+        check_recording(recorded, &options.out)?;
     }
     let mut run = Run::new(scene, thread_count(options.threads), options)?;
     run.all_frames(options)?;
@@ -94,6 +97,20 @@ pub fn replay(options: &ReplayOptions) -> Result<Outcome, AppError> {
         None => Ok(Outcome::Done),
         Some(recorded) => compare(recorded, &options.out),
     }
+}
+
+/// Refuses, before anything runs, a recording that can't be compared with what goes into `out`.
+fn check_recording(recorded: &Path, out: &Path) -> Result<(), AppError> {
+    States::read(recorded)?;
+    let real = |folder: &Path| folder.canonicalize().ok();
+    if real(recorded) == real(out) {
+        return Err(AppError::Usage(format!(
+            "--against and --out are both {}, so the run would replace what it is compared with: \
+             give --out another folder",
+            out.display()
+        )));
+    }
+    Ok(())
 }
 
 /// Says how the run in `now` differs from the one in `recorded`.

@@ -54,7 +54,7 @@ impl FramePlan {
             (PlaneFull::NAME, 2, method == Some(LightPathMethod::Full)),
             (
                 PlaneIncremental::NAME,
-                3,
+                2,
                 method == Some(LightPathMethod::Incremental),
             ),
             (Shadow::NAME, 1, shadow),

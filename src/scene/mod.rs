@@ -50,7 +50,8 @@ pub struct Scene {
     /// How far light travels below the surface.
     #[serde(default)]
     pub light_path: LightPathSection,
-    /// What lights it. Without any, a key and a rim light.
+    /// What lights it. Left out, a key and a rim light.
+    // Written even where it is empty: left out, it would be the two again.
     #[serde(default = "light::default_lights", rename = "light")]
     pub lights: Vec<LightSection>,
     /// Where it is seen from.

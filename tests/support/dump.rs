@@ -202,8 +202,7 @@ impl Dump {
         let [width, height] = self.size;
         let mut seen: Vec<Option<Seen>> = vec![None; width * height];
         for triangle in &self.now.triangles {
-            let world =
-                triangle.map(|v| self.now.points[self.now.point_of[v as usize] as usize]);
+            let world = triangle.map(|v| self.now.points[self.now.point_of[v as usize] as usize]);
             let [a, b, c] = world.map(|x| self.project(x));
             let (ab, ac) = (b - a, c - a);
             let area = ab.x * ac.y - ab.y * ac.x;
