@@ -52,7 +52,7 @@ fn vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) index: u3
 
 // What a polished surface mirrors in this room: two soft lamps and a floor.
 fn room(direction: vec3f) -> vec3f {
-    let up = smoothstep(-0.2, 1.0, direction.y);
+    let up = smoothstep(-0.9, 0.9, direction.y);
     let lamp = smoothstep(0.86, 0.97, dot(direction, normalize(vec3f(-0.35, 0.85, 0.4))));
     let rim = smoothstep(0.8, 0.98, dot(direction, normalize(vec3f(0.9, 0.15, -0.3))));
     return mix(vec3f(0.05, 0.052, 0.055), vec3f(0.62, 0.66, 0.70), up)

@@ -2,8 +2,9 @@
 
 use super::renderer::Renderer;
 use super::{AppError, Session};
+use crate::geom::plane::LightPathMethod;
 use crate::measure::files::{create_folder, write, write_npy};
-use crate::passes::frame::patch_radius_m;
+use crate::passes::frame::{effective_method, patch_radius_m};
 use crate::passes::view::{View, placed_lights};
 use serde_json::json;
 use std::path::Path;
@@ -76,12 +77,17 @@ pub fn write_dump(folder: &Path, session: &Session, renderer: &Renderer) -> Resu
         &[height, width],
         &renderer.depth()?,
     )?;
-    let text = serde_json::to_string_pretty(&description(session, renderer))
+    let text = serde_json::to_string_pretty(&description(session, renderer, planes.is_some()))
         .expect("a description has string keys");
     Ok(write(&folder.join("dump.json"), text.as_bytes())?)
 }
 
-fn description(session: &Session, renderer: &Renderer) -> serde_json::Value {
+const FITTED: &str = "plane { x : normal . (x - position) = offset_m }: least squares over the patch, \
+                      oriented with the normal";
+const TANGENT: &str = "plane { x : normal . (x - position) = 0 }: the tangent plane; the shaders of this \
+                       scene read no fitted one";
+
+fn description(session: &Session, renderer: &Renderer, fitted: bool) -> serde_json::Value {
     let scene = &session.scene;
     let orbit = renderer.scene_orbit(session);
     let view = View {
@@ -124,12 +130,12 @@ fn description(session: &Session, renderer: &Renderer) -> serde_json::Value {
         "surface": scene.surface,
         "layers": scene.surface.layers,
         "light_path": {
-            "method": scene.light_path.method.name(),
-            "radius_m": patch_radius_m(scene),
+            "method": effective_method(scene).map_or("none", LightPathMethod::name),
+            "radius_m": fitted.then(|| patch_radius_m(scene)),
         },
         "primitives": {
             "columns": ["normal_x", "normal_y", "normal_z", "offset_m"],
-            "meaning": "plane { x : normal . (x - position) = offset_m }: least squares over the patch, oriented with the normal; for `tangent`, which reads none, the tangent plane",
+            "meaning": if fitted { FITTED } else { TANGENT },
             "patch": "the points within radius_m of the point in rest_positions whose rest normals are not opposed (dot > 0), at least the 16 nearest; membership is symmetric; each point counts once though it may have several vertices (point_of)",
         },
         "arrays": {

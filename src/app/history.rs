@@ -59,6 +59,13 @@ impl History {
         self.samples.iter()
     }
 
+    /// Median wall time of a frame [ms]; 0 without frames.
+    pub fn median_wall_ms(&self) -> f32 {
+        let mut times: Vec<f32> = self.samples.iter().map(|sample| sample.wall_ms).collect();
+        times.sort_by(f32::total_cmp);
+        times.get(times.len() / 2).copied().unwrap_or(0.0)
+    }
+
     /// Stages of a frame, in order: the simulation, then every pass that any frame had.
     pub fn stages(&self) -> Vec<&'static str> {
         let mut names = vec!["simulation"];

@@ -218,12 +218,18 @@ const STAGE_COLORS: [Color32; 8] = [
 
 fn stage_plot(ui: &mut Ui, history: &History) {
     ui.label(RichText::new("frame time by stage [ms], the whole frame in white").weak());
+    let stage_ceiling_ms = 2.0 * history.median_wall_ms();
     let mut charts: Vec<BarChart> = Vec::new();
     for (index, stage) in history.stages().into_iter().enumerate() {
         let bars = history
             .iter()
             .enumerate()
-            .map(|(frame, sample)| Bar::new(frame as f64, f64::from(sample.stage_ms(stage))))
+            .map(|(frame, sample)| {
+                Bar::new(
+                    frame as f64,
+                    f64::from(sample.stage_ms(stage).min(stage_ceiling_ms)),
+                )
+            })
             .collect();
         let chart = BarChart::new(stage, bars)
             .width(1.0)
@@ -231,10 +237,12 @@ fn stage_plot(ui: &mut Ui, history: &History) {
             .stack_on(&charts.iter().collect::<Vec<_>>());
         charts.push(chart);
     }
+    // One frame that waited for a shader must not flatten all others.
+    let ceiling_ms = 3.0 * history.median_wall_ms();
     let wall: PlotPoints = history
         .iter()
         .enumerate()
-        .map(|(frame, sample)| [frame as f64, f64::from(sample.wall_ms)])
+        .map(|(frame, sample)| [frame as f64, f64::from(sample.wall_ms.min(ceiling_ms))])
         .collect();
     still_plot("stages").height(120.0).show(ui, |plot| {
         for chart in charts {

@@ -3,6 +3,7 @@
 use super::renderer::{Frame, Renderer};
 use super::session::{Session, Tick};
 use super::{AppError, VERSION_COMMIT, VERSION_NUMBER};
+use crate::measure::chart::three_digits;
 use crate::measure::log::{FrameRecord, write_frames_csv};
 use crate::measure::report::{self, replay_page};
 use crate::measure::states::States;
@@ -11,7 +12,7 @@ use crate::measure::summary::{
     MarkerSummary, MaxFinal, MeshCounts, RefitSummary, Summary, ToolSummary, passes, write_summary,
 };
 use crate::measure::trace::{Span, write_trace};
-use crate::passes::frame::FramePlan;
+use crate::passes::frame::{FramePlan, effective_method};
 use crate::sim::ToolAction;
 use image::RgbaImage;
 use std::io::Cursor;
@@ -68,12 +69,17 @@ impl Recording {
         }
     }
 
+    /// A frame is finished: the first one of all is remembered.
+    pub fn first_frame_done(&mut self) {
+        if self.first_frame_s == 0.0 {
+            self.first_frame_s = process_start().elapsed().as_secs_f64();
+        }
+    }
+
     /// Adds the frame that began at `start` and has just ended.
     pub fn add(&mut self, session: &Session, start: Instant, tick: &Tick, drawn: Frame) {
         let wall_ms = start.elapsed().as_secs_f32() * 1e3;
-        if self.records.is_empty() {
-            self.first_frame_s = process_start().elapsed().as_secs_f64();
-        }
+        self.first_frame_done();
         let mut passes_ms: Vec<(&'static str, f32)> = Vec::new();
         for pass in &drawn.passes {
             match passes_ms.iter_mut().find(|(name, _)| *name == pass.name) {
@@ -179,7 +185,14 @@ impl Recording {
     }
 
     fn summary(&self, session: &Session, renderer: Option<&Renderer>) -> Summary {
-        let plan = FramePlan::for_scene(&session.scene);
+        let plan = match renderer {
+            Some(_) => FramePlan::for_scene(&session.scene),
+            None => FramePlan::for_scene(&session.scene).undrawn(),
+        };
+        let method = match renderer.and_then(|_| effective_method(&session.scene)) {
+            Some(method) => method.name(),
+            None => "none",
+        };
         let drift = self.records.iter().map(|r| f64::from(r.volume_drift));
         let refitted = self.records.iter().map(|r| r.vertices_refitted);
         let frames = self.records.len().max(1) as f64;
@@ -191,7 +204,7 @@ impl Recording {
             threads: self.threads,
             frames: self.records.len() as u32,
             timestep_s: f64::from(session.scene.solver.timestep_s),
-            size: session.scene.output.size,
+            size: renderer.map_or([0; 2], Renderer::size),
             mesh: MeshCounts {
                 vertices: session.mesh.uvs.len(),
                 triangles: session.mesh.triangles.len(),
@@ -202,7 +215,7 @@ impl Recording {
             passes: passes(&self.records, |name| plan.count_of(name)),
             left_out: plan.left_out.iter().map(|&name| name.to_owned()).collect(),
             refit: RefitSummary {
-                method: session.scene.light_path.method.name().to_owned(),
+                method: method.to_owned(),
                 vertices: session.mesh.points.len(),
                 refitted_mean: refitted.clone().map(f64::from).sum::<f64>() / frames,
                 refitted_max: refitted.max().unwrap_or(0),
@@ -235,12 +248,19 @@ impl Recording {
     fn say(&self, summary: &Summary, out: &Path) {
         if let Some(frame) = &summary.frame_ms {
             eprintln!(
-                "{} frames, p50 {:.1} ms, p95 {:.1} ms, largest force {:.2} N; see {}",
+                "{} frames, p50 {:.1} ms, p95 {:.1} ms, largest force {} N; see {}",
                 summary.frames,
                 frame.p50,
                 frame.p95,
-                summary.tool.force_max_n,
+                three_digits(summary.tool.force_max_n),
                 out.join("report.html").display()
+            );
+        }
+        if summary.inverted_tets.last > 0 {
+            eprintln!(
+                "{} tetrahedra end inverted, so the body is wrecked: use more substeps, or the method \
+                 xpbd-neo-hookean",
+                summary.inverted_tets.last
             );
         }
         if self.frozen > 0 {

@@ -150,6 +150,7 @@ impl Run {
             None
         };
         create_folder(&options.out)?;
+        remove_old_pictures(&options.out)?;
         Ok(Self {
             recording: Recording::new(options.scene.clone(), threads),
             session,
@@ -192,6 +193,7 @@ impl Run {
         let wants_dump = options.dumps.contains(&0);
         if wants_picture || wants_dump {
             self.draw()?;
+            self.recording.first_frame_done();
         }
         if wants_picture {
             self.picture(&options.out)?;
@@ -229,6 +231,27 @@ impl Run {
             None => Ok(()),
         }
     }
+}
+
+/// Takes away the pictures of an earlier run, which would stand beside this one's files as if they were
+/// its own.
+fn remove_old_pictures(out: &Path) -> Result<(), AppError> {
+    let failed = |source| AppError::Read {
+        path: out.display().to_string(),
+        source,
+    };
+    for entry in std::fs::read_dir(out).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        let is_picture = path
+            .file_name()
+            .and_then(|name| name.to_str())
+            .and_then(|name| name.strip_prefix("frame-")?.strip_suffix(".png"))
+            .is_some_and(|number| number.bytes().all(|b| b.is_ascii_digit()));
+        if is_picture {
+            std::fs::remove_file(&path).map_err(failed)?;
+        }
+    }
+    Ok(())
 }
 
 /// Frames between two samples of the states: about ten samples a replay, whatever its length.

@@ -7,7 +7,7 @@ use crate::geom::SurfaceMesh;
 use crate::geom::ray::nearest_point;
 use crate::passes::tools::DrawnTool;
 use crate::scene::{MarkerSection, RestBox, Scene};
-use crate::sim::{Simulation, StepReport, ToolAction, ToolInput, ToolShape};
+use crate::sim::{Method, Simulation, StepReport, ToolAction, ToolInput, ToolShape};
 use glam::Vec3;
 use sha2::{Digest, Sha256};
 use std::time::Instant;
@@ -74,6 +74,8 @@ impl Session {
             .collect::<Result<_, _>>()?;
         let mut simulation = Simulation::new(setup, scene.solver);
         simulation.set_threads(Some(threads));
+        let mut notes = notes;
+        notes.extend(solver_notes(&scene, &simulation));
         Ok(Self {
             script: Script::new(&scene.tools, &mesh, &rest),
             simulation,
@@ -183,6 +185,29 @@ impl Session {
             .iter()
             .map(|marker| (marker, mean(&marker.points, self.points())))
     }
+}
+
+/// What a user should know before trusting the solver with this body.
+fn solver_notes(scene: &Scene, simulation: &Simulation) -> Vec<String> {
+    let mut notes = Vec::new();
+    if scene.solver.method == Method::MassSpring {
+        let substep_s = scene.solver.substep_s();
+        notes.push("mass-spring has a Poisson ratio of 1/4, whatever is asked for".to_owned());
+        if let Some(stable_s) = simulation.stable_substep_s()
+            && substep_s > stable_s
+        {
+            notes.push(format!(
+                "mass-spring is sure to be stable only below a substep of {stable_s:.1e} s and has \
+                 {substep_s:.1e} s: use {} substeps or a softer material",
+                (scene.solver.timestep_s / stable_s).ceil()
+            ));
+        }
+    }
+    let setup = simulation.setup();
+    if !setup.fixed.contains(&true) {
+        notes.push("nothing holds the body: body.fixed reaches no particle of it".to_owned());
+    }
+    notes
 }
 
 /// A hand that holds nothing: far away, doing nothing.

@@ -81,6 +81,15 @@ impl FramePlan {
         }
     }
 
+    /// The same for a run that draws nothing: every pass is left out.
+    pub fn undrawn(self) -> Self {
+        let passes = self.passes.into_iter().map(|(name, _)| name);
+        Self {
+            left_out: passes.chain(self.left_out).collect(),
+            passes: Vec::new(),
+        }
+    }
+
     /// Dispatches or draws of the pass called `name` in a frame.
     pub fn count_of(&self, name: &str) -> u32 {
         self.passes
@@ -91,7 +100,7 @@ impl FramePlan {
 }
 
 /// The light path of a scene; nothing where its surface marches no light.
-fn effective_method(scene: &Scene) -> Option<LightPathMethod> {
+pub fn effective_method(scene: &Scene) -> Option<LightPathMethod> {
     (scene.surface.kind == SurfaceKind::Subsurface).then_some(scene.light_path.method)
 }
 
