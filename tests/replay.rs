@@ -72,7 +72,7 @@ fn check_files(run: &Run, count: u32, png: usize) {
     check_states(run, count);
 
     let expected: BTreeSet<String> = (0..=count)
-        .filter(|frame| *frame == count || *frame as usize % png == 0)
+        .filter(|frame| *frame == count || (*frame as usize).is_multiple_of(png))
         .map(|frame| format!("frame-{frame:04}.png"))
         .collect();
     assert_eq!(run.pictures(), expected.into_iter().collect::<Vec<_>>());

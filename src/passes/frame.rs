@@ -135,10 +135,10 @@ pub struct FramePasses {
     size: [u32; 2],
 }
 
-/// Radius of the patches of a scene [m]: told, or from the first layer's extinction.
+/// Radius of the patches of a scene [m]: told, or from the densest layer's extinction.
 pub fn patch_radius_m(scene: &Scene) -> f32 {
     scene.light_path.radius_m.unwrap_or_else(|| {
-        radius_from_extinction_m(scene.surface.first_extinction_per_m(), PATCH_EPSILON)
+        radius_from_extinction_m(scene.surface.bounding_extinction_per_m(), PATCH_EPSILON)
     })
 }
 

@@ -72,7 +72,7 @@ pub struct LightPathSection {
     /// Which primitive stands for the surface around a point.
     pub method: LightPathMethod,
     /// Radius of the patch that a plane is fitted to [m]. Left out, it follows from the extinction
-    /// of the first layer (François 2006, section 2.2), and is at least the 16 nearest points.
+    /// of the densest layer (François 2006, section 2.2), and is at least the 16 nearest points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_m: Option<f32>,
     /// How far a point moves before `incremental` takes notice [m]. Left out, 1/4000 of the radius.

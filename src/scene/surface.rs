@@ -143,12 +143,15 @@ impl Default for SurfaceSection {
 }
 
 impl SurfaceSection {
-    /// Extinction σ_t of the first layer, of the colour that reaches deepest [1/m].
-    pub fn first_extinction_per_m(&self) -> f32 {
-        let layer = &self.layers[0];
-        (0..3)
-            .map(|c| layer.absorption_per_m[c] + layer.scattering_per_m[c])
-            .fold(f32::INFINITY, f32::min)
+    /// Extinction σ_t [1/m] that bounds how far light wanders: of the densest layer, in the colour that
+    /// reaches farthest there. The outermost one is a clear skin that light crosses in a moment.
+    pub fn bounding_extinction_per_m(&self) -> f32 {
+        let clearest = |layer: &LayerSection| {
+            (0..3)
+                .map(|c| layer.absorption_per_m[c] + layer.scattering_per_m[c])
+                .fold(f32::INFINITY, f32::min)
+        };
+        self.layers.iter().map(clearest).fold(0.0, f32::max)
     }
 
     pub(super) fn check(&self, c: &mut Checker) {
