@@ -64,7 +64,7 @@ fn pass_names(summary: &serde_json::Value) -> Vec<String> {
 }
 
 /// Checks all files of a replay of `count` frames with a picture every `png` frames.
-fn check_files(run: &Run, count: u32, png: usize) {
+fn check_files(run: &Run, count: u32, png: u32) {
     let summary = run.summary();
     let passes = pass_names(&summary);
     check_log(run, count, &summary, &passes);
@@ -72,7 +72,7 @@ fn check_files(run: &Run, count: u32, png: usize) {
     check_states(run, count);
 
     let expected: BTreeSet<String> = (0..=count)
-        .filter(|frame| *frame == count || (*frame as usize).is_multiple_of(png))
+        .filter(|frame| *frame == count || frame.is_multiple_of(png))
         .map(|frame| format!("frame-{frame:04}.png"))
         .collect();
     assert_eq!(run.pictures(), expected.into_iter().collect::<Vec<_>>());

@@ -145,7 +145,7 @@ pub fn patch_radius_m(scene: &Scene) -> f32 {
 /// How far a point may lie from where its patches last saw it [m]: told, or a share of their radius.
 ///
 /// What lags by a share of the radius turns a plane by about as many radians, by more where the patch is
-/// nearly as thick as wide: a 4000th turned the planes of a prodded spleen by 0.04 degrees at the 99.9th
+/// nearly as thick as wide: a 4000th turned the planes of a prodded spleen by 0.03 degrees at the 99.9th
 /// percentile, a 2000th by 0.07, and 0.05 is asked for (`tests/accuracy.rs`).
 pub fn tolerance_m(scene: &Scene) -> f32 {
     let told = scene.light_path.tolerance_m;
