@@ -14,12 +14,8 @@
 // Fails:   gradients above 65504 / m are cut.
 
 @group(0) @binding(1) var<storage, read> positions: array<vec4f>;
-@group(0) @binding(2) var<storage, read> point_of: array<u32>;
-@group(0) @binding(3) var<storage, read> uvs: array<vec2f>;
-@group(0) @binding(4) var<storage, read> normals: array<vec4f>;
-@group(0) @binding(5) var<storage, read> tangents: array<vec4f>;
-@group(0) @binding(6) var<storage, read> uv_gradients: array<array<vec4f, 2>>;
-@group(0) @binding(7) var<storage, read> planes: array<vec4f>;
+@group(0) @binding(2) var<storage, read> normals: array<vec4f>;
+@group(0) @binding(3) var<storage, read> planes: array<vec4f>;
 
 // 1 if `planes` holds planes; the tangent plane is meant where it is 0.
 override HAS_PLANES: u32 = 0u;
@@ -39,13 +35,15 @@ struct Packed {
 }
 
 @vertex
-fn geometry_vertex(@builtin(vertex_index) vertex: u32) -> Varyings {
-    let point = point_of[vertex];
+fn geometry_vertex(
+    @location(0) point: u32,
+    @location(1) uv: vec2f,
+    @location(2) tangent: vec4f,
+    @location(3) gradient_u: vec3f,
+    @location(4) gradient_v: vec3f,
+) -> Varyings {
     let normal = normals[point].xyz;
-    let tangent = tangents[vertex];
     let bitangent = tangent.w * cross(normal, tangent.xyz);
-    let gradient_u = uv_gradients[vertex][0].xyz;
-    let gradient_v = uv_gradients[vertex][1].xyz;
     var plane = vec4f(normal, 0.0);
     if HAS_PLANES != 0u {
         plane = planes[point];
@@ -54,7 +52,7 @@ fn geometry_vertex(@builtin(vertex_index) vertex: u32) -> Varyings {
         frame.clip_from_world * vec4f(positions[point].xyz, 1.0),
         normal,
         tangent,
-        uvs[vertex],
+        uv,
         vec4f(
             dot(gradient_u, tangent.xyz),
             dot(gradient_u, bitangent),
@@ -65,21 +63,33 @@ fn geometry_vertex(@builtin(vertex_index) vertex: u32) -> Varyings {
     );
 }
 
-@fragment
-fn geometry_fragment(in: Varyings) -> Packed {
+fn base_of(in: Varyings) -> vec4u {
     let handedness = select(0u, 1u, in.tangent.w < 0.0);
+    return vec4u(
+        bitcast<u32>(in.uv.x),
+        bitcast<u32>(in.uv.y),
+        octahedral(in.normal),
+        (octahedral(in.tangent.xyz) & 0xfffffffeu) | handedness,
+    );
+}
+
+// For models that look at the surface alone.
+@fragment
+fn base_fragment(in: Varyings) -> @location(0) vec4u {
+    return base_of(in);
+}
+
+// For models that look below it.
+@fragment
+fn detail_fragment(in: Varyings) -> Packed {
+    let gradients = clamp(in.gradients, vec4f(-65504.0), vec4f(65504.0));
     return Packed(
-        vec4u(
-            bitcast<u32>(in.uv.x),
-            bitcast<u32>(in.uv.y),
-            octahedral(in.normal),
-            (octahedral(in.tangent.xyz) & 0xfffffffeu) | handedness,
-        ),
+        base_of(in),
         vec4u(
             octahedral(in.plane.xyz),
             bitcast<u32>(in.plane.w),
-            pack2x16float(clamp(in.gradients.xy, vec2f(-65504.0), vec2f(65504.0))),
-            pack2x16float(clamp(in.gradients.zw, vec2f(-65504.0), vec2f(65504.0))),
+            pack2x16float(gradients.xy),
+            pack2x16float(gradients.zw),
         ),
     );
 }

@@ -30,6 +30,7 @@ pub fn storage<T: Pod>(gpu: &Gpu, label: &str, content: &[T]) -> Result<wgpu::Bu
             usage: wgpu::BufferUsages::STORAGE
                 | wgpu::BufferUsages::COPY_SRC
                 | wgpu::BufferUsages::COPY_DST
+                | wgpu::BufferUsages::VERTEX
                 | wgpu::BufferUsages::INDEX
                 | wgpu::BufferUsages::INDIRECT,
         }))

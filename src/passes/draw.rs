@@ -18,6 +18,11 @@ pub struct DrawKind<'a> {
     pub source: &'a str,
     /// Vertex entry point.
     pub vertex: &'a str,
+    /// Buffers of vertices: the stride of each [bytes] and its attributes.
+    ///
+    /// What a vertex has to itself is better read so than from storage: a software adapter fetches it for many
+    /// vertices at once.
+    pub attributes: &'a [(u64, &'a [wgpu::VertexAttribute])],
     /// Fragment entry point and the formats it draws to; none for depth alone.
     pub fragment: Option<(&'a str, &'a [wgpu::TextureFormat])>,
     /// How it is blended with what is there; left out, it replaces it.
@@ -79,6 +84,17 @@ impl Draw {
                 })
             })
             .collect();
+        let buffers: Vec<_> = kind
+            .attributes
+            .iter()
+            .map(|&(array_stride, attributes)| {
+                Some(wgpu::VertexBufferLayout {
+                    array_stride,
+                    step_mode: wgpu::VertexStepMode::Vertex,
+                    attributes,
+                })
+            })
+            .collect();
         let depth_test = match kind.depth {
             DepthUse::None => None,
             DepthUse::Nearest => Some((true, wgpu::CompareFunction::Less)),
@@ -93,7 +109,7 @@ impl Draw {
                     module: &module,
                     entry_point: Some(kind.vertex),
                     compilation_options: options.clone(),
-                    buffers: &[],
+                    buffers: &buffers,
                 },
                 primitive: wgpu::PrimitiveState {
                     cull_mode: kind.cull,

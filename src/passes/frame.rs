@@ -180,7 +180,7 @@ impl FramePasses {
         )?;
         let lights = placed_lights(scene, rest);
         let shadow = if lights.iter().any(|light| light.shadow) {
-            Some(Shadow::new(gpu, &mesh)?)
+            Some(Shadow::new(gpu, surface_mesh)?)
         } else {
             None
         };
@@ -213,8 +213,15 @@ impl FramePasses {
         } else {
             None
         };
-        let geometry = Geometry::new(gpu, &frame, &mesh, &tangents, light_path.planes())?;
-        let targets = GeometryTargets::new(gpu, size);
+        let geometry = Geometry::new(
+            gpu,
+            scene.surface.kind,
+            &frame,
+            &mesh,
+            &tangents,
+            light_path.planes(),
+        )?;
+        let targets = GeometryTargets::new(gpu, scene.surface.kind, size);
         let surface = Surface::new(
             gpu,
             &scene.surface,
@@ -265,7 +272,7 @@ impl FramePasses {
     pub fn resize(&mut self, gpu: &Gpu, size: [u32; 2]) -> Result<(), GpuError> {
         self.radiance = Target::new(gpu, "radiance", size, RADIANCE_FORMAT);
         self.picture = Target::new(gpu, "picture", size, PICTURE_FORMAT);
-        self.targets = GeometryTargets::new(gpu, size);
+        self.targets = GeometryTargets::new(gpu, self.knobs.kind, size);
         let shadow_map = self.shadow.as_ref().map_or(&self.no_shadow, |s| &s.target);
         self.surface.rebind(
             gpu,
@@ -332,7 +339,7 @@ impl FramePasses {
         }
         // What lies at each pixel.
         self.geometry
-            .record(&self.mesh, &self.targets, encoder, timer);
+            .record(&self.mesh, &self.tangents, &self.targets, encoder, timer);
         // The one surface model of the scene.
         self.surface
             .record(&self.radiance, &self.targets.depth, encoder, timer);

@@ -8,6 +8,7 @@ use super::draw::{DepthUse, Draw, DrawKind, Target, cleared_depth, kept};
 use super::mesh_buffers::MeshBuffers;
 use super::tangents::Tangents;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join};
+use crate::scene::SurfaceKind;
 
 /// Four words a pixel.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
@@ -16,18 +17,22 @@ const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 pub struct GeometryTargets {
     /// Texture coordinate, normal, tangent.
     pub base: Target,
-    /// Light-path plane, gradients of the texture coordinate.
+    /// Light-path plane, gradients of the texture coordinate; a texel where the model needs neither.
     pub detail: Target,
     /// Depth, 0 near to 1 far.
     pub depth: Target,
 }
 
 impl GeometryTargets {
-    /// Targets of `size` [px]. What is not covered is never written.
-    pub fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
+    /// Targets of `size` [px] for a model of `kind`. What is not covered is never written.
+    pub fn new(gpu: &Gpu, kind: SurfaceKind, size: [u32; 2]) -> Self {
+        let detail_size = match kind {
+            SurfaceKind::Plain => [1; 2],
+            SurfaceKind::Subsurface | SurfaceKind::Gooey => size,
+        };
         Self {
             base: Target::new(gpu, "base", size, FORMAT),
-            detail: Target::new(gpu, "detail", size, FORMAT),
+            detail: Target::new(gpu, "detail", detail_size, FORMAT),
             depth: Target::new(gpu, "depth", size, super::DEPTH_FORMAT),
         }
     }
@@ -36,7 +41,30 @@ impl GeometryTargets {
 /// The pass that draws the triangles.
 pub struct Geometry {
     draw: Draw,
+    has_detail: bool,
 }
+
+/// What a vertex has to itself: its point, texture coordinate, tangent, and gradients of the texture coordinate.
+const ATTRIBUTES: [(u64, &[wgpu::VertexAttribute]); 4] = [
+    (4, &wgpu::vertex_attr_array![0 => Uint32]),
+    (8, &wgpu::vertex_attr_array![1 => Float32x2]),
+    (16, &wgpu::vertex_attr_array![2 => Float32x4]),
+    (
+        32,
+        &[
+            wgpu::VertexAttribute {
+                format: wgpu::VertexFormat::Float32x3,
+                offset: 0,
+                shader_location: 3,
+            },
+            wgpu::VertexAttribute {
+                format: wgpu::VertexFormat::Float32x3,
+                offset: 16,
+                shader_location: 4,
+            },
+        ],
+    ),
+];
 
 impl Geometry {
     /// Name in logs.
@@ -44,18 +72,26 @@ impl Geometry {
     /// The WGSL files of this pass, joined in this order.
     pub const WGSL: &'static [Wgsl] = crate::wgsl!["frame.wgsl", "pack.wgsl", "geometry.wgsl"];
 
-    /// Builds the pass; without `planes` the tangent plane is written for them.
+    /// Builds the pass for a model of `kind`; without `planes` the tangent plane is written for them.
     ///
     /// # Errors
     ///
     /// [`GpuError::Shader`] if the WGSL does not compile on this adapter.
     pub fn new(
         gpu: &Gpu,
+        kind: SurfaceKind,
         frame: &wgpu::Buffer,
         mesh: &MeshBuffers,
         tangents: &Tangents,
         planes: Option<&wgpu::Buffer>,
     ) -> Result<Self, GpuError> {
+        // Only what lies below the surface is looked for with planes and gradients.
+        let has_detail = kind != SurfaceKind::Plain;
+        let fragment: (&str, &[wgpu::TextureFormat]) = if has_detail {
+            ("detail_fragment", &[FORMAT; 2])
+        } else {
+            ("base_fragment", &[FORMAT])
+        };
         let draw = Draw::new(
             gpu,
             &DrawKind {
@@ -63,7 +99,8 @@ impl Geometry {
                 parts: Self::WGSL,
                 source: &join(Self::WGSL),
                 vertex: "geometry_vertex",
-                fragment: Some(("geometry_fragment", &[FORMAT, FORMAT])),
+                attributes: &ATTRIBUTES,
+                fragment: Some(fragment),
                 blend: None,
                 depth: DepthUse::Nearest,
                 cull: Some(wgpu::Face::Back),
@@ -72,34 +109,41 @@ impl Geometry {
             &[
                 Binding::Uniform(frame),
                 Binding::Read(&mesh.positions),
-                Binding::Read(&mesh.point_of),
-                Binding::Read(&mesh.uvs),
                 Binding::Read(&tangents.normals),
-                Binding::Read(&tangents.tangents),
-                Binding::Read(&tangents.uv_gradients),
                 // Bound but never read where there are no planes.
                 Binding::Read(planes.unwrap_or(&tangents.normals)),
             ],
         )?;
-        Ok(Self { draw })
+        Ok(Self { draw, has_detail })
     }
 
     /// Adds the draw to `encoder`.
     pub fn record(
         &self,
         mesh: &MeshBuffers,
+        tangents: &Tangents,
         targets: &GeometryTargets,
         encoder: &mut wgpu::CommandEncoder,
         timer: &mut Timer,
     ) {
+        let colors = [kept(&targets.base.view), kept(&targets.detail.view)];
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some(Self::NAME),
-            color_attachments: &[kept(&targets.base.view), kept(&targets.detail.view)],
+            color_attachments: &colors[..if self.has_detail { 2 } else { 1 }],
             depth_stencil_attachment: Some(cleared_depth(&targets.depth.view)),
             timestamp_writes: timer.render(Self::NAME),
             ..Default::default()
         });
         self.draw.set(&mut pass);
+        let buffers = [
+            &mesh.point_of,
+            &mesh.uvs,
+            &tangents.tangents,
+            &tangents.uv_gradients,
+        ];
+        for (slot, buffer) in (0u32..).zip(buffers) {
+            pass.set_vertex_buffer(slot, buffer.slice(..));
+        }
         mesh.draw(&mut pass);
     }
 }

@@ -2,7 +2,8 @@
 
 use super::draw::{DepthUse, Draw, DrawKind, Target, cleared_depth};
 use super::mesh_buffers::MeshBuffers;
-use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, uniform};
+use crate::geom::SurfaceMesh;
+use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, storage, uniform};
 use glam::Mat4;
 
 /// Side of the map [px].
@@ -12,6 +13,9 @@ pub const SIZE_PX: u32 = 768;
 pub struct Shadow {
     draw: Draw,
     matrix: wgpu::Buffer,
+    /// Corners of the triangles as points: the map needs no texture coordinates.
+    indices: wgpu::Buffer,
+    index_count: u32,
     /// The map.
     pub target: Target,
 }
@@ -22,12 +26,12 @@ impl Shadow {
     /// The WGSL files of this pass, joined in this order.
     pub const WGSL: &'static [Wgsl] = crate::wgsl!["shadow.wgsl"];
 
-    /// Builds the pass for the surface in `mesh`.
+    /// Builds the pass for `mesh`.
     ///
     /// # Errors
     ///
     /// [`GpuError::Shader`] if the WGSL does not compile on this adapter.
-    pub fn new(gpu: &Gpu, mesh: &MeshBuffers) -> Result<Self, GpuError> {
+    pub fn new(gpu: &Gpu, mesh: &SurfaceMesh) -> Result<Self, GpuError> {
         let matrix = uniform(gpu, Self::NAME, &Mat4::IDENTITY.to_cols_array());
         let draw = Draw::new(
             gpu,
@@ -36,6 +40,7 @@ impl Shadow {
                 parts: Self::WGSL,
                 source: &join(Self::WGSL),
                 vertex: "shadow_vertex",
+                attributes: &[(16, &wgpu::vertex_attr_array![0 => Float32x3])],
                 fragment: None,
                 blend: None,
                 depth: DepthUse::Nearest,
@@ -43,15 +48,14 @@ impl Shadow {
                 cull: Some(wgpu::Face::Back),
                 constants: &[],
             },
-            &[
-                Binding::Uniform(&matrix),
-                Binding::Read(&mesh.positions),
-                Binding::Read(&mesh.point_of),
-            ],
+            &[Binding::Uniform(&matrix)],
         )?;
+        let indices = mesh.point_triangles();
         Ok(Self {
             draw,
             matrix,
+            indices: storage(gpu, "shadow triangles", indices.as_flattened())?,
+            index_count: 3 * indices.len() as u32,
             target: Target::new(gpu, Self::NAME, [SIZE_PX; 2], super::DEPTH_FORMAT),
         })
     }
@@ -75,6 +79,8 @@ impl Shadow {
             ..Default::default()
         });
         self.draw.set(&mut pass);
-        mesh.draw(&mut pass);
+        pass.set_vertex_buffer(0, mesh.positions.slice(..));
+        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..self.index_count, 0, 0..1);
     }
 }

@@ -107,6 +107,7 @@ impl Surface {
                 parts: Self::wgsl(section.kind),
                 source,
                 vertex: "pixel_vertex",
+                attributes: &[],
                 fragment: Some(("fragment", &[super::RADIANCE_FORMAT])),
                 blend: None,
                 depth: DepthUse::Covered,

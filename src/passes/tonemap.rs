@@ -31,6 +31,7 @@ impl ToneMap {
                 parts: Self::WGSL,
                 source: &join(Self::WGSL),
                 vertex: "tonemap_vertex",
+                attributes: &[],
                 fragment: Some(("tonemap_fragment", &[super::PICTURE_FORMAT])),
                 blend: Some(wgpu::BlendState::ALPHA_BLENDING),
                 depth: DepthUse::Covered,
