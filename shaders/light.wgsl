@@ -1,10 +1,11 @@
 // Light that enters the tissue: straight, round the terminator, and through thin parts. Reads `shadow_map`, which
 // the file before it declares.
 //
-//   E = ambient + sum_l E_l wrapped(n.l),  light 0 times exp(-sigma_eff way through the body)
+//   E = ambient + sum_l E_l wrapped(n.l),  light 0 times exp(-sigma_eff s / 2), s its way through the body
 //
 // The shadow map holds where light 0 enters the body, so one reading gives the hard shadow of the film and the
-// light that thin parts let through: the same depth, attenuated by each colour's own length.
+// light that thin parts let through: the same depth, attenuated by each colour's own length. Diffuse light takes
+// the shortest way: past the terminator of a round limb that is half of the straight one.
 //
 // Source:  Williams, "Casting Curved Shadows on Curved Surfaces", SIGGRAPH 1978; Green 2004, 16.2 and 16.3.
 // Twin:    src/optics/film.rs, fn wrapped
@@ -41,7 +42,7 @@ fn way_through(world: vec3f, normal: vec3f) -> f32 {
 
 // Light of the room from everywhere, brighter from above [W/m2].
 fn ambient(normal: vec3f) -> vec3f {
-    return (0.75 + 0.45 * normal.y) * vec3f(0.075, 0.080, 0.085);
+    return (1.0 + 0.7 * normal.y) * vec3f(0.150, 0.165, 0.175);
 }
 
 // Light that leaves the tissue after many scatterings, per colour [W/m2]: wrapped round the terminator, and
@@ -51,7 +52,7 @@ fn diffuse_of(k: u32, x: vec3f, soft: vec3f, wrap: vec3f, through: f32) -> vec3f
     let cosine = dot(soft, lit.to_light);
     var share = wrapped(cosine, wrap);
     if k == 0u && HAS_SHADOW != 0u {
-        share = max(share, 0.2 * wrap) * exp(-through * frame.through.xyz);
+        share = max(share, 0.2 * wrap) * exp(-0.5 * through * frame.through.xyz);
     }
     return share * lit.irradiance;
 }
