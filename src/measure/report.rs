@@ -535,7 +535,7 @@ mod tests {
         let folder = Folder::new();
         page.write(&folder.0.join("report.html")).unwrap();
         assert_eq!(folder.names(), ["report.html"]);
-        // To look at it in a browser: PALPATE_KEEP_REPORT=/tmp/report.html cargo test report_holds
+        // To look at it in a browser: PALPATE_KEEP_REPORT=report.html cargo test report_holds
         if let Some(keep) = std::env::var_os("PALPATE_KEEP_REPORT") {
             page.write(std::path::Path::new(&keep)).unwrap();
         }
