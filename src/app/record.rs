@@ -14,8 +14,6 @@ use crate::measure::summary::{
 use crate::measure::trace::{Span, write_trace};
 use crate::passes::frame::{FramePlan, effective_method};
 use crate::sim::ToolAction;
-use image::RgbaImage;
-use std::io::Cursor;
 use std::path::Path;
 use std::sync::OnceLock;
 use std::time::Instant;
@@ -284,23 +282,6 @@ impl Tick {
             .map(|(force, _)| force.length())
             .fold(0.0, f32::max)
     }
-}
-
-/// A picture as the bytes of a PNG.
-///
-/// # Errors
-///
-/// [`AppError::Map`] naming `file` if the encoder fails.
-pub fn encode_png(file: &Path, picture: &RgbaImage) -> Result<Vec<u8>, AppError> {
-    let mut bytes = Vec::new();
-    // Every pixel is opaque, so the file needs no alpha.
-    let rgb = image::DynamicImage::ImageRgba8(picture.clone()).into_rgb8();
-    rgb.write_to(&mut Cursor::new(&mut bytes), image::ImageFormat::Png)
-        .map_err(|e| AppError::Map {
-            path: file.display().to_string(),
-            message: e.to_string(),
-        })?;
-    Ok(bytes)
 }
 
 /// At most [`REPORT_PICTURES_MAX`] pictures, evenly chosen, the last one among them.

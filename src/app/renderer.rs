@@ -2,6 +2,7 @@
 
 use super::orbit::Orbit;
 use super::{AppError, Session, load};
+use crate::geom::paint::TissueMaps;
 use crate::gpu::{
     Gpu, PassTime, Timer, read_buffer, read_texture_depth, read_texture_rgba8, read_texture_rgba16f,
 };
@@ -12,6 +13,7 @@ use crate::passes::view::View;
 use crate::scene::Scene;
 use glam::Vec3;
 use image::RgbaImage;
+use std::sync::Arc;
 
 /// Passes that are timed in a frame; a gooey scene with eight blurs has nineteen.
 const TIMED_PASSES_MAX: u32 = 32;
@@ -21,6 +23,8 @@ pub struct Renderer {
     gpu: Gpu,
     passes: FramePasses,
     timer: Timer,
+    /// Kept for a change of surface or light path: painting takes seconds.
+    tissue: Arc<TissueMaps>,
 }
 
 /// What drawing one frame took.
@@ -39,7 +43,25 @@ impl Renderer {
     ///
     /// [`AppError`] naming the texture or the pass that can't be used.
     pub fn new(gpu: Gpu, session: &Session, size: [u32; 2]) -> Result<Self, AppError> {
-        let tissue = load::maps(&session.scene.body, &session.mesh)?;
+        let tissue = Arc::new(load::maps(&session.scene.body, &session.mesh)?);
+        Self::with_maps(gpu, session, tissue, size)
+    }
+
+    /// The same session with the passes that its scene asks for now, on the same maps.
+    ///
+    /// # Errors
+    ///
+    /// [`AppError::Gpu`] naming the pass that can't be used.
+    pub fn rebuilt(&self, session: &Session) -> Result<Self, AppError> {
+        Self::with_maps(self.gpu.clone(), session, self.tissue.clone(), self.size())
+    }
+
+    fn with_maps(
+        gpu: Gpu,
+        session: &Session,
+        tissue: Arc<TissueMaps>,
+        size: [u32; 2],
+    ) -> Result<Self, AppError> {
         let passes = FramePasses::new(
             &gpu,
             &session.scene,
@@ -52,6 +74,7 @@ impl Renderer {
             timer: Timer::new(&gpu, TIMED_PASSES_MAX),
             gpu,
             passes,
+            tissue,
         })
     }
 

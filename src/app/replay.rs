@@ -1,11 +1,11 @@
 //! The replay: a scene's script without a window, and the files it leaves.
 
-use super::record::{Recording, encode_png};
+use super::record::Recording;
 use super::renderer::{Frame, Renderer};
 use super::{AppError, Outcome, Session, dump, load, thread_count};
 use crate::gpu::Gpu;
 use crate::measure::against::compare_runs;
-use crate::measure::files::{create_folder, write};
+use crate::measure::files::{create_folder, encode_png, write};
 use crate::measure::pictures::PictureTolerance;
 use crate::measure::states::{Nearness, States};
 use crate::scene::Scene;

@@ -118,8 +118,9 @@ impl Session {
 
     /// The tools that can be seen: those of a script that plays, and a hand that does something.
     pub fn visible_tools(&self) -> Vec<DrawnTool> {
-        let hand = self.tools_now().len() - 1;
-        self.tools_now()
+        let tools = self.tools_now();
+        let hand = tools.len() - 1;
+        tools
             .into_iter()
             .enumerate()
             .filter(|&(index, tool)| {

@@ -5,12 +5,12 @@ use super::history::{History, Sample};
 use super::load;
 use super::orbit::{Orbit, Ray};
 use super::panel::{self, PanelAsk, PanelState};
-use super::record::{Recording, encode_png};
+use super::record::Recording;
 use super::renderer::Renderer;
 use super::replay::{ReplayOptions, replay};
 use super::{AppError, Outcome, Session, thread_count};
 use crate::gpu::{Gpu, GpuError};
-use crate::measure::files::write;
+use crate::measure::write_png;
 use crate::sim::ToolAction;
 use egui_wgpu::ScreenDescriptor;
 use glam::Vec2;
@@ -626,7 +626,7 @@ impl Shown {
     }
 
     fn rebuild(&mut self) -> Result<(), AppError> {
-        self.renderer = Renderer::new(self.gpu.clone(), &self.session, self.renderer.size())?;
+        self.renderer = self.renderer.rebuilt(&self.session)?;
         self.show_new_picture();
         Ok(())
     }
@@ -639,8 +639,7 @@ impl Shown {
                 break path;
             }
         };
-        let png = encode_png(&path, &self.renderer.picture()?)?;
-        self.state.error = match write(&path, &png) {
+        self.state.error = match write_png(&path, &self.renderer.picture()?) {
             Ok(()) => {
                 self.state.message = format!("saved {}", path.display());
                 None

@@ -129,14 +129,25 @@ pub fn write_with(
 ///
 /// [`FileError::Write`].
 pub fn write_png(file: &Path, picture: &image::RgbaImage) -> Result<(), FileError> {
+    write(file, &encode_png(file, picture)?)
+}
+
+/// The bytes of a PNG of an opaque picture; `file` is named if the encoder fails.
+///
+/// # Errors
+///
+/// [`FileError::Write`].
+pub fn encode_png(file: &Path, picture: &image::RgbaImage) -> Result<Vec<u8>, FileError> {
     let mut bytes = io::Cursor::new(Vec::new());
-    picture
+    // Every pixel is opaque, so the file needs no alpha.
+    image::DynamicImage::ImageRgba8(picture.clone())
+        .into_rgb8()
         .write_to(&mut bytes, image::ImageFormat::Png)
         .map_err(|error| FileError::Write {
             file: file.to_owned(),
             source: io::Error::other(error),
         })?;
-    write(file, bytes.get_ref())
+    Ok(bytes.into_inner())
 }
 
 /// Writes `values`, last index fastest, as a NumPy array of `shape`.
