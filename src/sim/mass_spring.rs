@@ -7,9 +7,9 @@
 //! Source of the stiffness: Van Gelder, "Approximate Simulation of Elastic Membranes by
 //! Triangulated Spring Meshes", JGT 3, 1998; the average is derived here.
 
+use super::team::Team;
 use crate::geom::TetMesh;
 use glam::{Vec3, Vec4};
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// An edge of the mesh.
@@ -59,11 +59,11 @@ pub struct MassSpring {
     springs: Vec<Spring>,
     /// Where the springs of each particle start; one more at the end.
     starts: Vec<u32>,
-    accelerations: Vec<Vec3>,
+    accelerations: Vec<Vec4>,
 }
 
-/// Particles a task.
-const PARTICLES_PER_TASK: usize = 1024;
+/// Particles a chunk: some microseconds.
+const PARTICLES_PER_CHUNK: usize = 64;
 
 impl MassSpring {
     /// Springs along the edges of the tetrahedra `sound` of `mesh`, of which `fill` is tissue.
@@ -86,12 +86,12 @@ impl MassSpring {
         Self {
             springs: at.concat(),
             starts,
-            accelerations: vec![Vec3::ZERO; mesh.particles.len()],
+            accelerations: vec![Vec4::ZERO; mesh.particles.len()],
         }
     }
 
     /// Acceleration of each particle [m/s²] by its springs, of Young's modulus `modulus_pa`.
-    pub fn accelerations(&mut self, particles: &[Vec4], modulus_pa: f32) -> &[Vec3] {
+    pub fn accelerations(&mut self, team: &Team, particles: &[Vec4], modulus_pa: f32) -> &[Vec4] {
         let (springs, starts) = (&self.springs, &self.starts);
         let at = |index: usize| {
             let here = particles[index];
@@ -105,26 +105,17 @@ impl MassSpring {
                     force += edge * (modulus_pa * spring.stiffness_per_modulus_m * stretch);
                 }
             }
-            here.w * force
+            (here.w * force).extend(0.0)
         };
-        let run = |(task, out): (usize, &mut [Vec3])| {
-            for (offset, acceleration) in out.iter_mut().enumerate() {
-                *acceleration = at(task * PARTICLES_PER_TASK + offset);
-            }
-        };
-        if self.accelerations.len() >= 2 * PARTICLES_PER_TASK && rayon::current_num_threads() > 1 {
-            (self
-                .accelerations
-                .par_chunks_mut(PARTICLES_PER_TASK)
-                .enumerate())
-            .for_each(run);
-        } else {
-            (self
-                .accelerations
-                .chunks_mut(PARTICLES_PER_TASK)
-                .enumerate())
-            .for_each(run);
-        }
+        team.for_runs(
+            &mut self.accelerations,
+            PARTICLES_PER_CHUNK,
+            |start, run| {
+                for (offset, acceleration) in run.iter_mut().enumerate() {
+                    *acceleration = at(start + offset);
+                }
+            },
+        );
         &self.accelerations
     }
 
@@ -180,7 +171,7 @@ mod tests {
             }
         }
         let mut model = MassSpring::new(mesh, &all, &fill);
-        let found = model.accelerations(&places, modulus_pa);
+        let found = model.accelerations(&Team::alone(), &places, modulus_pa);
         for (found, gradient) in found.iter().zip(&gradient) {
             let expected = -inverse_mass * *gradient;
             // Sums of some fifteen forces in f32.
@@ -198,7 +189,7 @@ mod tests {
         let all: Vec<u32> = (0..5).collect();
         let mut model = MassSpring::new(&lattice.tets, &all, &[1.0; 5]);
         let places = vec![Vec3::ONE.extend(1.0); 9];
-        let found = model.accelerations(&places, 1e4);
+        let found = model.accelerations(&Team::alone(), &places, 1e4);
         assert!(found.iter().all(|a| *a == Vec3::ZERO));
     }
 }

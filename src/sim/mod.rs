@@ -16,6 +16,7 @@ mod neo_hookean;
 mod particles;
 mod simulation;
 mod springs;
+mod team;
 mod tools;
 
 pub use simulation::Simulation;

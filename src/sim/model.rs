@@ -2,9 +2,10 @@
 
 use super::{
     Method, SolverParams, mass_spring::MassSpring, neo_hookean::NeoHookean, springs::Springs,
+    team::Team,
 };
 use crate::geom::TetMesh;
-use glam::{Vec3, Vec4};
+use glam::Vec4;
 
 /// What resists deformation.
 #[derive(Clone, Debug)]
@@ -24,42 +25,63 @@ impl Model {
         }
     }
 
-    /// Accelerations that act before the particles move [m/s²]; `None` for models of constraints.
-    pub fn accelerations(&mut self, particles: &[Vec4], params: &SolverParams) -> Option<&[Vec3]> {
+    /// Starts a substep. Returns the accelerations that act before the particles move [m/s²], one
+    /// each at least, or `None` for a model of constraints that starts from nothing.
+    pub fn begin_substep(
+        &mut self,
+        team: &Team,
+        particles: &mut [Vec4],
+        params: &SolverParams,
+    ) -> Option<&[Vec4]> {
         match self {
             Self::MassSpring(model) => {
-                Some(model.accelerations(particles, params.youngs_modulus_pa))
+                Some(model.accelerations(team, particles, params.youngs_modulus_pa))
             }
-            Self::Springs(_) | Self::NeoHookean(_) => None,
+            Self::Springs(model) => {
+                model.begin_substep();
+                None
+            }
+            Self::NeoHookean(model) => Some(model.begin_substep(team, particles, params)),
         }
     }
 
-    /// Sets all multipliers to 0, as a substep starts.
-    pub fn begin_substep(&mut self) {
+    /// Forgets what the last substeps left: the body was put somewhere else.
+    pub fn forget(&mut self, particles: &mut [Vec4], params: &SolverParams) {
         match self {
-            Self::MassSpring(_) => {}
-            Self::Springs(model) => model.begin_substep(),
-            Self::NeoHookean(model) => model.begin_substep(),
+            Self::MassSpring(_) | Self::Springs(_) => {}
+            Self::NeoHookean(model) => model.forget(particles, params),
+        }
+    }
+
+    /// Whether the body is wrecked and is led back to its last sound shape.
+    pub fn is_restoring(&self) -> bool {
+        match self {
+            Self::MassSpring(_) | Self::Springs(_) => false,
+            Self::NeoHookean(model) => model.is_restoring(),
         }
     }
 
     /// One sweep over all constraints.
-    pub fn project(&mut self, particles: &mut [Vec4], params: &SolverParams) {
+    pub fn project(&mut self, team: &Team, particles: &mut [Vec4], params: &SolverParams) {
         let (lame, substep_s) = (params.lame(), params.substep_s());
         match self {
             Self::MassSpring(_) => {}
-            Self::Springs(model) => model.project(particles, lame, substep_s),
-            Self::NeoHookean(model) => model.project(particles, lame, substep_s),
+            Self::Springs(model) => model.project(team, particles, lame, substep_s),
+            Self::NeoHookean(model) => model.project(team, particles),
         }
     }
 
-    /// RMS of C + α̃λ over all constraints, each free of units; 0 for a model without constraints.
-    pub fn residual_rms(&self, particles: &mut [Vec4], params: &SolverParams) -> f32 {
-        let (lame, substep_s) = (params.lame(), params.substep_s());
+    /// RMS of what is left of the constraints after a step, free of units: C + α̃λ over rest length
+    /// or volume, or the misfit of stress and deformation over Young's modulus; 0 for a model
+    /// without constraints.
+    pub fn residual_rms(&mut self, particles: &mut [Vec4], params: &SolverParams) -> f32 {
         let (sum, count) = match self {
             Self::MassSpring(_) => (0.0, 0),
-            Self::Springs(model) => model.residual(particles, lame, substep_s),
-            Self::NeoHookean(model) => model.residual(particles, lame, substep_s),
+            Self::Springs(model) => model.residual(particles, params.lame(), params.substep_s()),
+            Self::NeoHookean(model) => {
+                let residual = model.assess(particles, params);
+                (residual.squared_sum, residual.count)
+            }
         };
         (sum / count.max(1) as f64).sqrt() as f32
     }

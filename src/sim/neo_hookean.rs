@@ -1,71 +1,85 @@
-//! Stable neo-Hookean tetrahedra in XPBD: shape and dilation of a tetrahedron solved together.
+//! Stable neo-Hookean tetrahedra in XPBD, the nine components of the stress solved together.
 //!
-//! The two constraints of `constraint::shape` and `constraint::dilation` share all four particles,
-//! so their 2×2 system (J W Jᵀ + α̃) Δλ = −(C + α̃ λ) is solved as one: solved one after the other
-//! they would undo each other's work.
+//! XPBD's multiplier of a constraint is, over the square of the substep, a force. Here a
+//! tetrahedron of volume V has nine of them, the entries of its stress T, and the constraint is
+//! that T be the first Piola-Kirchhoff stress P(F) of its deformation gradient F. A change D of T
+//! moves corner k, of inverse mass w and shape gradient g, by −h² V w D g, and so changes F by
+//! −h² V D S with S = Σ w g gᵀ. To first order, T + D = P(F − h² V D S) is
+//!
+//! D + h² V H : (D S) = P(F) − T,
+//!
+//! nine equations with H = ∂P/∂F. One sweep solves them for each tetrahedron in turn. Three things
+//! make one sweep a substep enough:
+//!
+//! * H is replaced by c μ 1 + (λ+μ) cof F ⊗ cof F, the rank-one part in full and the rest by a
+//!   bound: |(λ+μ)(J−1) − μ| ‖∂cof F/∂F‖ is at most μ where the stress is moderate, so c = 2. The
+//!   system then has a closed form, Q = S (1 + c μ h² V S)⁻¹ being constant; a stiffer H only
+//!   shortens steps whose end is the same.
+//! * A substep starts from the stress where the last one ended, as contact solvers do. A body at
+//!   rest is then exactly in balance, however few sweeps it gets; from zero, as textbooks start,
+//!   each substep finds only a part of the force and the body sags.
+//! * What is carried over acts where the last substep left the body, so an explicit step is hidden
+//!   in it. It is cut where that would be unstable: see [`CARRIED_STIFFNESS_MAX`] and
+//!   [`CARRIED_STRESS_IN_E`].
+//!
+//! Sources: Macklin, Müller, Chentanez, "XPBD: Position-Based Simulation of Compliant Constrained
+//! Dynamics", MIG 2016; Smith, de Goes, Kim, "Stable Neo-Hookean Flesh Simulation", ACM TOG 37,
+//! 2018 (the energy). The stress form and its closed solution are derived here.
 
 #![expect(
     clippy::needless_range_loop,
     reason = "one counter for several arrays of the same fixed length"
 )]
 
+mod kernel;
+
 use super::{
-    Lame,
-    constraint::SHAPE_SQUARED_MIN,
-    lanes::{Colored, Corner, Corners, LANES, Lanes, Lanes3, ParticleAccess},
+    Lame, SolverParams,
+    lanes::{Colored, LANES, Lanes, ParticleAccess},
+    team::Team,
 };
 use crate::geom::TetMesh;
-use glam::{DMat3, Vec4};
+use glam::{DMat3, DVec3, Vec4};
+use kernel::{Batch, STIFFNESS_IN_MU, Step};
 
-/// A 2×2 system nearer to singular than this is pulled away from it: both gradients are parallel
-/// in pure dilation, and single precision leaves no more digits.
-const DETERMINANT_SHARE_MIN: f32 = 1e-5;
-
-/// Eight tetrahedra.
-#[derive(Clone, Debug)]
-#[repr(C, align(32))]
-struct Batch {
-    corners: Corners<4>,
-    /// Inverse of the rest edges, row by row [1/m].
-    rest_inverse: [Lanes3; 3],
-    /// Its determinant: one over six rest volumes [1/m³].
-    determinant: Lanes,
-    /// One over the tissue volume [1/m³]; compliance times modulus.
-    inverse_volume: Lanes,
-    /// Multipliers of shape and dilation, of this substep.
-    lambda: [Lanes; 2],
-}
-
-/// Values and gradients of the two constraints of eight tetrahedra.
-struct Linearized {
-    shape: Lanes,
-    dilation: Lanes,
-    shape_gradient: [Lanes3; 4],
-    dilation_gradient: [Lanes3; 4],
-}
+/// Largest h² V (λ+2μ) tr S, over the number of sweeps, whose stress is carried over whole; above,
+/// the share falls as its inverse. A uniform mesh of spacing d has about 6 (h c/d)² here, c being
+/// the speed of sound. Undamped beams gained energy from 120 on, at one sweep; 40 leaves room.
+pub const CARRIED_STIFFNESS_MAX: f32 = 40.0;
+/// A stress of more Young's moduli than this is carried over cut down to it: only a wreck has it,
+/// and there the explicit step throws things about.
+const CARRIED_STRESS_IN_E: f32 = 2.0;
+/// A body is wrecked once more than this share of its tetrahedra is, and on its way back until
+/// less than the second share is.
+const WRECKED_SHARES: [f64; 2] = [0.2, 0.01];
+/// Volume over rest volume below which a tetrahedron is wrecked, in a sound body and in one that
+/// is on its way back.
+const WRECKED_VOLUMES: [f32; 2] = [-0.05, 0.1];
 
 /// All tetrahedra of a body.
 #[derive(Clone, Debug)]
 pub struct NeoHookean {
     tets: Colored<Batch>,
+    tet_count: usize,
+    /// What the stresses do to each particle [m/s²], and the place that no particle owns.
+    accelerations: Vec<Vec4>,
+    /// The last shape that was not wrecked [m], and the place that no particle owns.
+    sound: Vec<Vec4>,
+    /// What the responses and shares of `tets` were made for.
+    ready_for: Option<SolverParams>,
+    step: Step,
+    /// Whether the body is wrecked and is led back to its last sound shape.
+    restoring: bool,
 }
 
-/// The compliances of a substep times tissue volume, α̃ V [1/(Pa s²)].
-#[derive(Clone, Copy)]
-struct Compliance {
-    shape: f32,
-    dilation: f32,
-}
-
-impl Compliance {
-    fn new(lame: Lame, substep_s: f32) -> Self {
-        let h2 = substep_s * substep_s;
-        Self {
-            shape: 1.0 / (lame.mu_pa * h2),
-            // λ is 0 at ν = 0: a dilation that resists nothing is infinitely compliant.
-            dilation: (1.0 / (lame.lambda_pa * h2)).min(1e30),
-        }
-    }
+/// How all tetrahedra stand.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Residual {
+    /// Sum over all tetrahedra of ‖P − T‖² over E².
+    pub squared_sum: f64,
+    /// Number of tetrahedra.
+    pub count: usize,
+    wrecked: usize,
 }
 
 impl NeoHookean {
@@ -76,9 +90,10 @@ impl NeoHookean {
             let mut batch = Batch {
                 corners,
                 rest_inverse: Default::default(),
-                determinant: Lanes::default(),
-                inverse_volume: Lanes::splat(1.0),
-                lambda: Default::default(),
+                volume_m3: Lanes::default(),
+                response: Default::default(),
+                kept: Lanes::splat(1.0),
+                stress: Default::default(),
             };
             for (lane, &member) in members.iter().enumerate() {
                 let tet = sound[member as usize] as usize;
@@ -90,298 +105,271 @@ impl NeoHookean {
                     batch.rest_inverse[row].y.0[lane] = values.y;
                     batch.rest_inverse[row].z.0[lane] = values.z;
                 }
-                let determinant = inverse.determinant();
-                batch.determinant.0[lane] = determinant as f32;
-                batch.inverse_volume.0[lane] = (6.0 * determinant) as f32 / fill[tet];
+                let volume = 1.0 / (6.0 * inverse.determinant());
+                batch.volume_m3.0[lane] = volume as f32 * fill[tet];
             }
             batch
         });
-        Self { tets }
+        let mut rest: Vec<Vec4> = mesh.particles.iter().map(|x| x.extend(0.0)).collect();
+        rest.push(Vec4::ZERO);
+        Self {
+            tets,
+            tet_count: sound.len(),
+            accelerations: vec![Vec4::ZERO; rest.len()],
+            sound: rest,
+            ready_for: None,
+            step: Step::default(),
+            restoring: false,
+        }
     }
 
-    /// Sets all multipliers to 0, as a substep starts.
-    pub fn begin_substep(&mut self) {
-        for batch in self.tets.batches_mut() {
-            batch.lambda = Default::default();
+    /// Starts a substep from the stress where the last one ended, and returns what that does to
+    /// each particle [m/s²]; the last entry is of the place that no particle owns.
+    pub fn begin_substep(
+        &mut self,
+        team: &Team,
+        particles: &mut [Vec4],
+        params: &SolverParams,
+    ) -> &[Vec4] {
+        if self.ready_for != Some(*params) {
+            self.make_ready(team, particles, params);
+        } else {
+            let (step, places) = (self.step, reading(particles));
+            self.tets
+                .for_each_colored(team, &mut self.accelerations, |run, accelerations| {
+                    run_avx(run, Work::Shed, places, accelerations, places, step);
+                });
         }
+        &self.accelerations
     }
 
     /// One sweep over all tetrahedra.
-    pub fn project(&mut self, particles: &mut [Vec4], lame: Lame, substep_s: f32) {
-        let compliance = Compliance::new(lame, substep_s);
-        self.tets.for_each_colored(particles, |run, access| {
-            project_run(run, access, compliance)
+    pub fn project(&mut self, team: &Team, particles: &mut [Vec4]) {
+        let step = self.step;
+        let sound = reading(&mut self.sound);
+        let accelerations = reading(&mut self.accelerations);
+        let work = if self.restoring {
+            Work::Restore
+        } else {
+            Work::Project
+        };
+        self.tets.for_each_colored(team, particles, |run, places| {
+            run_avx(run, work, places, accelerations, sound, step);
         });
     }
 
-    /// Sum of squares of all residuals C + α̃λ, and how many there are.
-    pub fn residual(&self, particles: &mut [Vec4], lame: Lame, substep_s: f32) -> (f64, usize) {
-        let compliance = Compliance::new(lame, substep_s);
-        let unused = particles.len() as u32 - 1;
-        let access = ParticleAccess::reading(particles);
-        let (mut sum, mut count) = (0.0, 0);
-        for batch in self.tets.batches() {
-            let c = linearize(batch, &gather(batch, access));
-            let shape = c.shape + batch.inverse_volume * batch.lambda[0].times(compliance.shape);
-            let dilation =
-                c.dilation + batch.inverse_volume * batch.lambda[1].times(compliance.dilation);
-            for lane in (0..LANES).filter(|&lane| batch.corners[0][lane] != unused) {
-                sum += f64::from(shape.0[lane]).powi(2) + f64::from(dilation.0[lane]).powi(2);
-                count += 2;
+    /// Forgets all stress: the body was put somewhere else. A wrecked one is led back from there.
+    pub fn forget(&mut self, particles: &mut [Vec4], params: &SolverParams) {
+        for batch in self.tets.batches_mut() {
+            batch.stress = Default::default();
+        }
+        self.accelerations.fill(Vec4::ZERO);
+        self.assess(particles, params);
+    }
+
+    /// How far stress and deformation are apart, after a step; decides whether the body is
+    /// wrecked, and remembers its shape if it is not.
+    pub fn assess(&mut self, particles: &mut [Vec4], params: &SolverParams) -> Residual {
+        self.step = step_of(params);
+        let residual = self.standing(particles);
+        let share = residual.wrecked as f64 / residual.count.max(1) as f64;
+        self.restoring = share > WRECKED_SHARES[usize::from(self.restoring)];
+        if !self.restoring && residual.wrecked == 0 {
+            self.sound.copy_from_slice(particles);
+        }
+        residual
+    }
+
+    /// Whether the body is wrecked and is led back to its last sound shape.
+    pub fn is_restoring(&self) -> bool {
+        self.restoring
+    }
+
+    fn standing(&self, particles: &mut [Vec4]) -> Residual {
+        let places = reading(particles);
+        let volume_min = WRECKED_VOLUMES[usize::from(self.restoring)];
+        let (squared_sum_pa2, wrecked) =
+            standing_of(self.tets.batches(), places, self.step, volume_min);
+        let young_pa = f64::from(self.step.carried_max_pa / CARRIED_STRESS_IN_E);
+        Residual {
+            squared_sum: squared_sum_pa2 / (young_pa * young_pa),
+            count: self.tet_count,
+            wrecked,
+        }
+    }
+
+    /// Responses, shares and accelerations for these parameters.
+    fn make_ready(&mut self, team: &Team, particles: &mut [Vec4], params: &SolverParams) {
+        let step = step_of(params);
+        self.step = step;
+        self.ready_for = Some(*params);
+        let stiffness_max = CARRIED_STIFFNESS_MAX * params.iterations as f32;
+        for batch in self.tets.batches_mut() {
+            for lane in 0..LANES {
+                let k = f64::from(step.h2_s2 * batch.volume_m3.0[lane]);
+                let mobility = mobility(batch, lane, particles);
+                let shear = k * f64::from(STIFFNESS_IN_MU * step.mu_pa);
+                let response = mobility * (DMat3::IDENTITY + mobility * shear).inverse();
+                let [x, y, z] = [response.x_axis, response.y_axis, response.z_axis];
+                let entries = [x.x, y.y, z.z, x.y, y.z, z.x];
+                for (entry, value) in entries.iter().enumerate() {
+                    batch.response[entry].0[lane] = *value as f32;
+                }
+                let trace = mobility.x_axis.x + mobility.y_axis.y + mobility.z_axis.z;
+                let stiffness = (k * trace) as f32 * (step.bulk_pa + step.mu_pa);
+                batch.kept.0[lane] = (stiffness_max / stiffness.max(stiffness_max)).min(1.0);
             }
         }
-        (sum, count)
+        self.accelerations.fill(Vec4::ZERO);
+        let places = reading(particles);
+        self.tets
+            .for_each_colored(team, &mut self.accelerations, |run, accelerations| {
+                for batch in run {
+                    batch.accelerate_anew(places, accelerations);
+                }
+            });
     }
 }
 
-/// Projects one batch after the other, with the widest vectors the machine has.
-fn project_run(run: &mut [Batch], access: ParticleAccess, compliance: Compliance) {
+/// S = Σ w g gᵀ of one tetrahedron [1/(kg m²)].
+fn mobility(batch: &Batch, lane: usize, particles: &[Vec4]) -> DMat3 {
+    let mut sum = DMat3::ZERO;
+    let mut first = DVec3::ZERO;
+    let outer = |g: DVec3, w: f32| {
+        let g_w = f64::from(w) * g;
+        DMat3::from_cols(g_w * g.x, g_w * g.y, g_w * g.z)
+    };
+    for k in 0..3 {
+        let row = &batch.rest_inverse[k];
+        let g = glam::Vec3::new(row.x.0[lane], row.y.0[lane], row.z.0[lane]).as_dvec3();
+        first -= g;
+        sum += outer(g, particles[batch.corners[k + 1][lane] as usize].w);
+    }
+    sum + outer(first, particles[batch.corners[0][lane] as usize].w)
+}
+
+fn step_of(params: &SolverParams) -> Step {
+    let Lame { mu_pa, lambda_pa } = params.lame();
+    Step {
+        mu_pa,
+        bulk_pa: lambda_pa + mu_pa,
+        h2_s2: params.substep_s() * params.substep_s(),
+        carried_max_pa: CARRIED_STRESS_IN_E * params.youngs_modulus_pa,
+    }
+}
+
+fn reading(particles: &mut [Vec4]) -> ParticleAccess {
+    ParticleAccess::reading(particles)
+}
+
+/// What is done to a run of batches.
+#[derive(Clone, Copy, Debug)]
+enum Work {
+    Project,
+    Restore,
+    Shed,
+}
+
+/// Works on one batch after the other, with the widest vectors the machine has.
+fn run_avx(
+    run: &mut [Batch],
+    work: Work,
+    places: ParticleAccess,
+    accelerations: ParticleAccess,
+    sound: ParticleAccess,
+    step: Step,
+) {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the machine has AVX2.
-        return unsafe { project_run_avx2(run, access, compliance) };
+        return unsafe { run_with_avx2(run, work, places, accelerations, sound, step) };
     }
-    for batch in run {
-        project_batch(batch, access, compliance);
-    }
+    run_batches(run, work, places, accelerations, sound, step);
 }
 
 /// The same code, compiled for eight lanes an instruction. No fused multiply-add: bits stay.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn project_run_avx2(run: &mut [Batch], access: ParticleAccess, compliance: Compliance) {
-    for batch in run {
-        project_batch(batch, access, compliance);
-    }
+fn run_with_avx2(
+    run: &mut [Batch],
+    work: Work,
+    places: ParticleAccess,
+    accelerations: ParticleAccess,
+    sound: ParticleAccess,
+    step: Step,
+) {
+    run_batches(run, work, places, accelerations, sound, step);
 }
 
 #[inline(always)]
-fn gather(batch: &Batch, access: ParticleAccess) -> [Corner; 4] {
-    [
-        access.gather(&batch.corners[0]),
-        access.gather(&batch.corners[1]),
-        access.gather(&batch.corners[2]),
-        access.gather(&batch.corners[3]),
-    ]
-}
-
-/// Sum of three vectors, each times its factor. A function and no closure: closures are compiled
-/// for the narrow vectors of the base machine.
-#[inline(always)]
-fn combine(vectors: [Lanes3; 3], factors: [Lanes; 3]) -> Lanes3 {
-    vectors[0].scaled(factors[0]) + vectors[1].scaled(factors[1]) + vectors[2].scaled(factors[2])
-}
-
-/// Values and gradients; the twin of `constraint::shape` and `constraint::dilation`.
-#[inline(always)]
-fn linearize(batch: &Batch, corners: &[Corner; 4]) -> Linearized {
-    let one = Lanes::splat(1.0);
-    let two = Lanes::splat(2.0);
-    let rows = &batch.rest_inverse;
-    let origin = corners[0].position;
-    let a = corners[1].position - origin;
-    let b = corners[2].position - origin;
-    let c = corners[3].position - origin;
-
-    // Columns of F = [a b c] · rest inverse.
-    let fx = combine([a, b, c], [rows[0].x, rows[1].x, rows[2].x]);
-    let fy = combine([a, b, c], [rows[0].y, rows[1].y, rows[2].y]);
-    let fz = combine([a, b, c], [rows[0].z, rows[1].z, rows[2].z]);
-
-    // ∂J/∂x of corners 1 to 3.
-    let d1 = b.cross(c).scaled(batch.determinant);
-    let d2 = c.cross(a).scaled(batch.determinant);
-    let d3 = a.cross(b).scaled(batch.determinant);
-    let j = a.dot(d1);
-    let dilation = j - one;
-
-    let (xx, yy, zz) = (fx.dot(fx) - one, fy.dot(fy) - one, fz.dot(fz) - one);
-    let (xy, yz, zx) = (fx.dot(fy), fy.dot(fz), fz.dot(fx));
-    let (xy2, yz2, zx2) = (xy * xy, yz * yz, zx * zx);
-    let second = xx * yy + yy * zz + zz * xx - xy2 - yz2 - zx2;
-    let third = xx * yy * zz + two * xy * yz * zx - xx * yz2 - yy * zx2 - zz * xy2;
-    let near = two * dilation * dilation - second - third;
-    let trace = xx + yy + zz + Lanes::splat(3.0);
-    let far = trace + j * j - Lanes::splat(4.0) * j;
-    let squared = Lanes::where_below(trace, 4.0, near, far).map(|x| if x > 0.0 { x } else { 0.0 });
-    let shape = squared.map(f32::sqrt);
-    let inverse_shape = Lanes::where_below(
-        squared,
-        SHAPE_SQUARED_MIN,
-        Lanes::default(),
-        squared.map(|x| 1.0 / x.max(SHAPE_SQUARED_MIN).sqrt()),
-    );
-
-    // ∂C/∂x of corners 1 to 3: (F + (J − 2) cof F) / C times a row of the rest inverse.
-    let f = [fx, fy, fz];
-    let towards = j - two;
-    let s1 = (combine(f, rows[0].parts()) + d1.scaled(towards)).scaled(inverse_shape);
-    let s2 = (combine(f, rows[1].parts()) + d2.scaled(towards)).scaled(inverse_shape);
-    let s3 = (combine(f, rows[2].parts()) + d3.scaled(towards)).scaled(inverse_shape);
-    Linearized {
-        shape,
-        dilation,
-        shape_gradient: [-(s1 + s2 + s3), s1, s2, s3],
-        dilation_gradient: [-(d1 + d2 + d3), d1, d2, d3],
+fn run_batches(
+    run: &mut [Batch],
+    work: Work,
+    places: ParticleAccess,
+    accelerations: ParticleAccess,
+    sound: ParticleAccess,
+    step: Step,
+) {
+    match work {
+        Work::Project => {
+            for batch in run {
+                batch.project(places, accelerations, step);
+            }
+        }
+        Work::Restore => {
+            for batch in run {
+                batch.restore(places, accelerations, sound, step);
+            }
+        }
+        Work::Shed => {
+            for batch in run {
+                batch.shed(places, accelerations, step);
+            }
+        }
     }
 }
 
-#[inline(always)]
-fn project_batch(batch: &mut Batch, access: ParticleAccess, compliance: Compliance) {
-    let mut corners = gather(batch, access);
-    let c = linearize(batch, &corners);
-
-    let alpha_shape = batch.inverse_volume.times(compliance.shape);
-    let alpha_dilation = batch.inverse_volume.times(compliance.dilation);
-    let (mut ss, mut dd, mut sd) = (alpha_shape, alpha_dilation, Lanes::default());
-    for k in 0..4 {
-        let w = corners[k].inverse_mass;
-        ss = ss + w * c.shape_gradient[k].dot(c.shape_gradient[k]);
-        dd = dd + w * c.dilation_gradient[k].dot(c.dilation_gradient[k]);
-        sd = sd + w * c.shape_gradient[k].dot(c.dilation_gradient[k]);
+/// Sum of squares of what is left of the equations [Pa²], and the number of wrecked tetrahedra.
+fn standing_of(
+    batches: &[Batch],
+    places: ParticleAccess,
+    step: Step,
+    volume_share_min: f32,
+) -> (f64, usize) {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the machine has AVX2.
+        return unsafe { standing_with_avx2(batches, places, step, volume_share_min) };
     }
-    let shape = c.shape + alpha_shape * batch.lambda[0];
-    let dilation = c.dilation + alpha_dilation * batch.lambda[1];
-    let product = ss * dd;
-    let determinant = (product - sd * sd).zip(product.times(DETERMINANT_SHARE_MIN), |d, min| {
-        if d > min { d } else { min }
-    });
-    let inverse = determinant.map(|d| 1.0 / d);
-    let delta_shape = (sd * dilation - dd * shape) * inverse;
-    let delta_dilation = (sd * shape - ss * dilation) * inverse;
-    batch.lambda[0] = batch.lambda[0] + delta_shape;
-    batch.lambda[1] = batch.lambda[1] + delta_dilation;
-
-    for k in 0..4 {
-        let step =
-            c.shape_gradient[k].scaled(delta_shape) + c.dilation_gradient[k].scaled(delta_dilation);
-        corners[k].position = corners[k].position + step.scaled(corners[k].inverse_mass);
-        access.scatter(&batch.corners[k], corners[k]);
-    }
+    add_standings(batches, places, step, volume_share_min)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::sim::constraint;
-    use glam::{Mat3, Vec3, Vec3Swizzles};
-    use proptest::prelude::*;
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn standing_with_avx2(
+    batches: &[Batch],
+    places: ParticleAccess,
+    step: Step,
+    volume_share_min: f32,
+) -> (f64, usize) {
+    add_standings(batches, places, step, volume_share_min)
+}
 
-    const LAME: Lame = Lame {
-        mu_pa: 2e3,
-        lambda_pa: 2e4,
-    };
-    const SUBSTEP_S: f32 = 1e-3;
-
-    /// Eight tetrahedra side by side, none sharing a particle, each moved by three of `moves`.
-    fn eight(moves: &[f32]) -> (TetMesh, Vec<Vec4>) {
-        let mut mesh = TetMesh::default();
-        let mut places = Vec::new();
+#[inline(always)]
+fn add_standings(
+    batches: &[Batch],
+    places: ParticleAccess,
+    step: Step,
+    volume_share_min: f32,
+) -> (f64, usize) {
+    let mut squared_sum_pa2 = 0.0;
+    let mut wrecked = 0.0;
+    for batch in batches {
+        let standing = batch.standing(places, step, volume_share_min);
         for lane in 0..LANES {
-            let first = mesh.particles.len() as u32;
-            for corner in [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z] {
-                let rest = 0.01 * (corner + 0.2 * corner.yzx());
-                let k = 3 * mesh.particles.len();
-                let moved = rest + 0.008 * Vec3::from_slice(&moves[k..k + 3]);
-                mesh.particles.push(rest);
-                places.push(moved.extend(1e4 * (1.0 + corner.x + lane as f32)));
-            }
-            mesh.tets.push([first, first + 1, first + 2, first + 3]);
-        }
-        places.push(Vec4::ZERO);
-        (mesh, places)
-    }
-
-    /// One projection of one tetrahedron from the formulas of `constraint`, in f64 where it counts.
-    fn projected(mesh: &TetMesh, tet: usize, places: &[Vec4]) -> [Vec3; 4] {
-        let [a, b, c, d] = mesh.tets[tet].map(|i| mesh.particles[i as usize]);
-        let rest_inverse = Mat3::from_cols(b - a, c - a, d - a).inverse();
-        let volume = 1.0 / (6.0 * f64::from(rest_inverse.determinant()));
-        let x = mesh.tets[tet].map(|i| places[i as usize].truncate());
-        let w = mesh.tets[tet].map(|i| f64::from(places[i as usize].w));
-        let h2 = f64::from(SUBSTEP_S).powi(2);
-        let shape = constraint::shape(x, rest_inverse).expect("the tetrahedron is deformed");
-        let dilation = constraint::dilation(x, rest_inverse);
-        let inner = |a: [Vec3; 4], b: [Vec3; 4]| -> f64 {
-            (0..4)
-                .map(|k| w[k] * a[k].as_dvec3().dot(b[k].as_dvec3()))
-                .sum()
-        };
-        let ss =
-            inner(shape.gradient, shape.gradient) + 1.0 / (f64::from(LAME.mu_pa) * h2 * volume);
-        let dd = inner(dilation.gradient, dilation.gradient)
-            + 1.0 / (f64::from(LAME.lambda_pa) * h2 * volume);
-        let sd = inner(shape.gradient, dilation.gradient);
-        let determinant = ss * dd - sd * sd;
-        let (s, d) = (f64::from(shape.value), f64::from(dilation.value));
-        let delta = [
-            (sd * d - dd * s) / determinant,
-            (sd * s - ss * d) / determinant,
-        ];
-        std::array::from_fn(|k| {
-            let step = delta[0] * shape.gradient[k].as_dvec3()
-                + delta[1] * dilation.gradient[k].as_dvec3();
-            x[k] + (w[k] * step).as_vec3()
-        })
-    }
-
-    /// Worst distance between kernel and formulas over eight tetrahedra [m].
-    fn worst_difference_m(moves: &[f32], lame: Lame) -> f32 {
-        let (mesh, mut places) = eight(moves);
-        let expected: Vec<[Vec3; 4]> = (0..LANES)
-            .map(|tet| projected(&mesh, tet, &places))
-            .collect();
-        let all: Vec<u32> = (0..LANES as u32).collect();
-        let mut model = NeoHookean::new(&mesh, &all, &[1.0; LANES]);
-        model.project(&mut places, lame, SUBSTEP_S);
-        let mut worst = 0.0_f32;
-        for (tet, expected) in expected.iter().enumerate() {
-            for k in 0..4 {
-                let found = places[mesh.tets[tet][k] as usize].truncate();
-                worst = worst.max(found.distance(expected[k]));
-            }
-        }
-        worst
-    }
-
-    /// Edges are 1 cm, and the 2×2 system loses two to three of seven digits.
-    const TOLERANCE_M: f32 = 1e-5;
-
-    proptest! {
-        #[test]
-        fn kernel_moves_corners_as_the_constraint_formulas_say(
-            moves in prop::collection::vec(-1.0_f32..1.0, 12 * LANES),
-        ) {
-            let worst = worst_difference_m(&moves, LAME);
-            prop_assert!(worst < TOLERANCE_M, "{worst} m");
+            squared_sum_pa2 += f64::from(standing.residual_squared.0[lane]);
+            wrecked += standing.wrecked.0[lane];
         }
     }
-
-    #[test]
-    fn kernel_check_rejects_another_stiffness() {
-        let moves: Vec<f32> = (0..12 * LANES)
-            .map(|i| ((i * 37) % 19) as f32 / 19.0)
-            .collect();
-        let softer = Lame {
-            mu_pa: 0.5 * LAME.mu_pa,
-            ..LAME
-        };
-        assert!(worst_difference_m(&moves, softer) > 10.0 * TOLERANCE_M);
-    }
-
-    #[test]
-    fn collapsed_and_coincident_corners_stay_finite() {
-        for scale in [0.0, 1e-20, 1e-3] {
-            let (mesh, mut places) = eight(&[0.0; 12 * LANES]);
-            for place in &mut places {
-                *place = (scale * place.truncate()).extend(place.w);
-            }
-            let all: Vec<u32> = (0..LANES as u32).collect();
-            let mut model = NeoHookean::new(&mesh, &all, &[1.0; LANES]);
-            for _ in 0..10 {
-                model.project(&mut places, LAME, SUBSTEP_S);
-            }
-            assert!(places.iter().all(|place| place.is_finite()), "{scale}");
-        }
-    }
+    (squared_sum_pa2, wrecked as usize)
 }

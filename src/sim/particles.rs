@@ -1,8 +1,8 @@
 //! The state of the particles, and handles by which a place between them is moved.
 
+use super::team::{SharedSlice, Team};
 use crate::geom::Embedding;
 use glam::{Vec3, Vec4};
-use rayon::prelude::*;
 
 /// Positions, velocities and inverse masses of a body.
 #[derive(Clone, Debug)]
@@ -18,8 +18,8 @@ pub struct Particles {
     finite: Vec<Vec4>,
 }
 
-/// Particles a task; fewer are not worth another thread.
-const PARTICLES_PER_TASK: usize = 4096;
+/// Particles a chunk: about a microsecond.
+const PARTICLES_PER_CHUNK: usize = 512;
 
 impl Particles {
     /// Particles at `rest`, still.
@@ -41,42 +41,42 @@ impl Particles {
         self.finite.copy_from_slice(&self.places);
     }
 
-    /// Moves every free particle by its velocity, after gravity and `accelerations` (one each, or
-    /// none at all) have changed that.
-    pub fn predict(&mut self, gravity_m_s2: Vec3, accelerations: Option<&[Vec3]>, substep_s: f32) {
-        let count = self.velocities.len();
-        self.places
-            .par_chunks_mut(PARTICLES_PER_TASK)
-            .zip(self.previous.par_chunks_mut(PARTICLES_PER_TASK))
-            .zip(self.velocities.par_chunks_mut(PARTICLES_PER_TASK))
-            .with_min_len(1 + (2 * PARTICLES_PER_TASK).saturating_sub(count))
-            .enumerate()
-            .for_each(|(task, ((places, previous), velocities))| {
-                for (offset, velocity) in velocities.iter_mut().enumerate() {
-                    let place = &mut places[offset];
-                    previous[offset] = *place;
-                    if place.w > 0.0 {
-                        let own = accelerations
-                            .map_or(Vec3::ZERO, |a| a[task * PARTICLES_PER_TASK + offset]);
-                        *velocity += substep_s * (gravity_m_s2 + own);
-                        *place += (substep_s * *velocity).extend(0.0);
-                    }
+    /// Moves every free particle by its velocity, after gravity and `accelerations` (one each at
+    /// least, or none at all) have changed that.
+    pub fn predict(
+        &mut self,
+        team: &Team,
+        gravity_m_s2: Vec3,
+        accelerations: Option<&[Vec4]>,
+        substep_s: f32,
+    ) {
+        let places = SharedSlice::new(&mut self.places);
+        let previous = SharedSlice::new(&mut self.previous);
+        team.for_runs(&mut self.velocities, PARTICLES_PER_CHUNK, |start, run| {
+            let end = start + run.len();
+            // SAFETY: as the runs of velocities, those of places do not overlap.
+            let (places, previous) = unsafe { (places.run(start, end), previous.run(start, end)) };
+            previous.copy_from_slice(places);
+            for (offset, (velocity, place)) in run.iter_mut().zip(places).enumerate() {
+                if place.w > 0.0 {
+                    let own = accelerations.map_or(Vec3::ZERO, |a| a[start + offset].truncate());
+                    *velocity += substep_s * (gravity_m_s2 + own);
+                    *place += (substep_s * *velocity).extend(0.0);
                 }
-            });
+            }
+        });
     }
 
     /// Velocities from what the substep did to the positions.
-    pub fn update_velocities(&mut self, substep_s: f32) {
+    pub fn update_velocities(&mut self, team: &Team, substep_s: f32) {
         let per_s = 1.0 / substep_s;
-        let count = self.velocities.len();
-        self.velocities
-            .par_iter_mut()
-            .zip(&self.places)
-            .zip(&self.previous)
-            .with_min_len((2 * PARTICLES_PER_TASK).min(count + 1))
-            .for_each(|((velocity, place), previous)| {
-                *velocity = per_s * (place.truncate() - previous.truncate());
-            });
+        let (places, previous) = (&self.places, &self.previous);
+        team.for_runs(&mut self.velocities, PARTICLES_PER_CHUNK, |start, run| {
+            for (offset, velocity) in run.iter_mut().enumerate() {
+                let way = places[start + offset] - previous[start + offset];
+                *velocity = per_s * way.truncate();
+            }
+        });
     }
 
     /// Rolls every particle that is not finite back to where the step found it and holds it there.

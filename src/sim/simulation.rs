@@ -6,6 +6,7 @@ use super::{
     grab::Tissue,
     model::Model,
     particles::Particles,
+    team::Team,
     tools::{Met, Tools},
 };
 use crate::geom::bounds;
@@ -17,6 +18,8 @@ const CALM_SIZES_PER_S: f32 = 5e-4;
 /// So many calm steps in a row put it to sleep: half a second, longer than it hangs still at the
 /// turning point of a swing.
 const CALM_STEPS: u32 = 30;
+/// A smaller body has colours too small to share.
+const SHARED_TETS_MIN: usize = 3000;
 /// Points a task, in bringing the surface up to date.
 const POINTS_PER_TASK: usize = 4096;
 
@@ -163,6 +166,7 @@ impl Simulation {
         self.tools = Tools::default();
         self.frozen = 0;
         self.report = StepReport::default();
+        self.model.forget(&mut self.particles.places, &self.solver);
         self.wake();
         self.publish();
     }
@@ -189,6 +193,7 @@ impl Simulation {
                 self.particles.velocities[i] = velocities[i];
             }
         }
+        self.model.forget(&mut self.particles.places, &self.solver);
         self.wake();
         self.publish();
     }
@@ -274,10 +279,23 @@ impl Simulation {
         }
 
         self.particles.keep_finite();
-        for substep in 0..self.solver.substeps {
-            self.substep(substep);
+        let shared = self.sound.len() >= SHARED_TETS_MIN;
+        let mut lead = |team: &Team| {
+            for substep in 0..self.solver.substeps {
+                self.substep(team, substep);
+            }
+        };
+        if shared {
+            Team::with(lead);
+        } else {
+            lead(&Team::alone());
         }
-        let damping = (-self.setup.damping_per_s * self.solver.timestep_s).exp();
+        // A wrecked body's speed comes from the wreck; it would overshoot its shape.
+        let damping = if self.model.is_restoring() {
+            0.0
+        } else {
+            (-self.setup.damping_per_s * self.solver.timestep_s).exp()
+        };
         for velocity in &mut self.particles.velocities {
             *velocity *= damping;
         }
@@ -307,21 +325,21 @@ impl Simulation {
     }
 
     /// Predict, constraints by colour, tools, velocities.
-    fn substep(&mut self, substep: u32) {
+    fn substep(&mut self, team: &Team, substep: u32) {
         let substep_s = self.solver.substep_s();
         let share = |k: u32| k as f32 / self.solver.substeps as f32;
         let (from, to) = (share(substep), share(substep + 1));
-        let accelerations = (self.model).accelerations(&self.particles.places, &self.solver);
+        let accelerations =
+            (self.model).begin_substep(team, &mut self.particles.places, &self.solver);
         self.particles
-            .predict(self.setup.gravity_m_s2, accelerations, substep_s);
-        self.model.begin_substep();
+            .predict(team, self.setup.gravity_m_s2, accelerations, substep_s);
         self.tools.begin_substep();
         for _ in 0..self.solver.iterations {
-            (self.model).project(&mut self.particles.places, &self.solver);
+            (self.model).project(team, &mut self.particles.places, &self.solver);
             self.tools.solve(&mut self.particles, from, to, substep_s);
         }
         self.tools.end_substep(substep_s);
-        self.particles.update_velocities(substep_s);
+        self.particles.update_velocities(team, substep_s);
     }
 
     /// Copies the state to where others read it, and brings the surface up to date.

@@ -9,6 +9,7 @@ use super::{
     constraint::LENGTH_MIN_M,
     lanes::{Colored, Corner, Corners, LANES, Lanes, Lanes3, ParticleAccess},
     mass_spring::edges_of,
+    team::Team,
 };
 use crate::geom::TetMesh;
 use glam::Vec4;
@@ -113,15 +114,16 @@ impl Springs {
     }
 
     /// One sweep over all edges, then over all volumes.
-    pub fn project(&mut self, particles: &mut [Vec4], lame: Lame, substep_s: f32) {
+    pub fn project(&mut self, team: &Team, particles: &mut [Vec4], lame: Lame, substep_s: f32) {
         let compliance = Compliance::new(lame, substep_s);
-        self.edges.for_each_colored(particles, |run, access| {
+        self.edges.for_each_colored(team, particles, |run, access| {
             project_edges(run, access, compliance.edge);
         });
         if let Some(compliance) = compliance.volume {
-            self.volumes.for_each_colored(particles, |run, access| {
-                project_volumes(run, access, compliance);
-            });
+            self.volumes
+                .for_each_colored(team, particles, |run, access| {
+                    project_volumes(run, access, compliance);
+                });
         }
     }
 
@@ -320,7 +322,7 @@ mod tests {
             .collect();
         springs
             .volumes
-            .for_each_colored(&mut places, |run, access| {
+            .for_each_colored(&Team::alone(), &mut places, |run, access| {
                 project_volumes(run, access, compliance);
             });
         for k in 0..4 {

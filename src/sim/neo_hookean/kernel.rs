@@ -1,0 +1,281 @@
+//! Eight neo-Hookean tetrahedra at a time: the arithmetic of one projection.
+
+use super::super::lanes::{Corner, Corners, LANES, Lanes, Lanes3, ParticleAccess};
+
+/// Eight tetrahedra.
+#[derive(Clone, Debug)]
+#[repr(C, align(32))]
+pub struct Batch {
+    pub corners: Corners<4>,
+    /// Inverse of the rest edges, row by row [1/m]: row k is the gradient of corner k + 1.
+    pub rest_inverse: [Lanes3; 3],
+    /// Volume that is tissue [m³].
+    pub volume_m3: Lanes,
+    /// Q = S (1 + a S)⁻¹ [1/(kg m²)], see the head of `neo_hookean`: xx, yy, zz, xy, yz, zx.
+    pub response: [Lanes; 6],
+    /// Share of the stress that the next substep starts from.
+    pub kept: Lanes,
+    /// The multipliers: columns of the stress T [Pa].
+    pub stress: [Lanes3; 3],
+}
+
+/// What a projection needs to know of material and time step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Step {
+    /// Shear modulus μ [Pa].
+    pub mu_pa: f32,
+    /// λ + μ [Pa].
+    pub bulk_pa: f32,
+    /// Square of the substep [s²].
+    pub h2_s2: f32,
+    /// A stress beyond this is not carried into the next substep as it is [Pa].
+    pub carried_max_pa: f32,
+}
+
+/// Weight of the isotropic part of the local stiffness, in shear moduli (see `neo_hookean`).
+pub const STIFFNESS_IN_MU: f32 = 2.0;
+
+/// A tetrahedron whose ‖F‖² (3 at rest) is outside of these is crushed or torn long.
+const SQUARED_MIN: f32 = 1.0;
+const SQUARED_MAX: f32 = 12.0;
+
+/// Deformation gradient, its cofactor and its determinant.
+struct Deformation {
+    f: [Lanes3; 3],
+    cofactor: [Lanes3; 3],
+    j: Lanes,
+}
+
+/// How a batch stands: what is left of its equations, and which of its lanes are wrecked.
+#[derive(Clone, Copy, Default)]
+pub struct Standing {
+    /// Square of the difference between the stress of the deformation and the multipliers [Pa²].
+    pub residual_squared: Lanes,
+    /// 1 where a tetrahedron is turned inside out, crushed or torn long, else 0.
+    pub wrecked: Lanes,
+}
+
+impl Batch {
+    #[inline(always)]
+    fn gather(&self, access: ParticleAccess) -> [Corner; 4] {
+        [
+            access.gather(&self.corners[0]),
+            access.gather(&self.corners[1]),
+            access.gather(&self.corners[2]),
+            access.gather(&self.corners[3]),
+        ]
+    }
+
+    /// Columns of [a b c] · rest inverse.
+    #[inline(always)]
+    fn gradient(&self, [a, b, c]: [Lanes3; 3]) -> [Lanes3; 3] {
+        let rows = &self.rest_inverse;
+        [
+            a.scaled(rows[0].x) + b.scaled(rows[1].x) + c.scaled(rows[2].x),
+            a.scaled(rows[0].y) + b.scaled(rows[1].y) + c.scaled(rows[2].y),
+            a.scaled(rows[0].z) + b.scaled(rows[1].z) + c.scaled(rows[2].z),
+        ]
+    }
+
+    #[inline(always)]
+    fn deformation(&self, corners: &[Corner; 4]) -> Deformation {
+        let f = self.gradient(edges(corners));
+        let cofactor = [f[1].cross(f[2]), f[2].cross(f[0]), f[0].cross(f[1])];
+        let j = f[0].dot(cofactor[0]);
+        Deformation { f, cofactor, j }
+    }
+
+    /// Lets a change D of the stress act: −V w D g on the acceleration of each corner, and h² times
+    /// that on its place.
+    #[inline(always)]
+    fn act(
+        &self,
+        corners: &[Corner; 4],
+        change: [Lanes3; 3],
+        places: ParticleAccess,
+        accelerations: ParticleAccess,
+        h2_s2: f32,
+    ) {
+        let rows = &self.rest_inverse;
+        let v = -self.volume_m3;
+        let d1 = along(change, rows[0]);
+        let d2 = along(change, rows[1]);
+        let d3 = along(change, rows[2]);
+        let d0 = -(d1 + d2 + d3);
+        let d = [d0, d1, d2, d3];
+        for k in 0..4 {
+            let acceleration = d[k].scaled(v * corners[k].inverse_mass);
+            accelerations.add(&self.corners[k], acceleration, places, h2_s2);
+        }
+    }
+
+    /// Columns times the symmetric 3×3 response.
+    #[inline(always)]
+    fn responded(&self, columns: [Lanes3; 3]) -> [Lanes3; 3] {
+        let [xx, yy, zz, xy, yz, zx] = self.response;
+        let [x, y, z] = columns;
+        [
+            x.scaled(xx) + y.scaled(xy) + z.scaled(zx),
+            x.scaled(xy) + y.scaled(yy) + z.scaled(yz),
+            x.scaled(zx) + y.scaled(yz) + z.scaled(zz),
+        ]
+    }
+
+    /// Moves stress and corners to where they fit each other, with the neighbours held.
+    #[inline(always)]
+    pub fn project(
+        &mut self,
+        particles: ParticleAccess,
+        accelerations: ParticleAccess,
+        step: Step,
+    ) {
+        let corners = self.gather(particles);
+        let Deformation { f, cofactor, j } = self.deformation(&corners);
+        let volumetric = (j - Lanes::splat(1.0)).times(step.bulk_pa) - Lanes::splat(step.mu_pa);
+        let k = self.volume_m3.times(step.h2_s2);
+        let bulk = k.times(step.bulk_pa);
+        let shear = k.times(STIFFNESS_IN_MU * step.mu_pa);
+
+        let mut rest = [Lanes3::default(); 3];
+        for i in 0..3 {
+            rest[i] = f[i].times(step.mu_pa) + cofactor[i].scaled(volumetric) - self.stress[i];
+        }
+        // Sherman and Morrison: the rank-one bulk term on top of the isotropic one.
+        let bent = self.responded(cofactor);
+        let share = inner(rest, bent) * bulk / (Lanes::splat(1.0) + bulk * inner(cofactor, bent));
+        for i in 0..3 {
+            rest[i] = rest[i] - cofactor[i].scaled(share);
+        }
+        let soft = self.responded(rest);
+        self.settle(&corners, rest, soft, shear, particles, accelerations, step);
+    }
+
+    /// The same with another material, whose only rest is the shape that `sound` holds: convex, so
+    /// that nothing is ever in the way back.
+    #[inline(always)]
+    pub fn restore(
+        &mut self,
+        particles: ParticleAccess,
+        accelerations: ParticleAccess,
+        sound: ParticleAccess,
+        step: Step,
+    ) {
+        let corners = self.gather(particles);
+        let [a, b, c] = edges(&corners);
+        let [sound_a, sound_b, sound_c] = edges(&self.gather(sound));
+        let change = self.gradient([a - sound_a, b - sound_b, c - sound_c]);
+        let stiffness = STIFFNESS_IN_MU * step.mu_pa;
+        let shear = self.volume_m3.times(step.h2_s2 * stiffness);
+        let mut rest = [Lanes3::default(); 3];
+        for i in 0..3 {
+            rest[i] = change[i].times(stiffness) - self.stress[i];
+        }
+        let soft = self.responded(rest);
+        self.settle(&corners, rest, soft, shear, particles, accelerations, step);
+    }
+
+    /// Applies the change of stress `rest − shear · soft`.
+    #[inline(always)]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "the tail of two kernels, inlined"
+    )]
+    fn settle(
+        &mut self,
+        corners: &[Corner; 4],
+        rest: [Lanes3; 3],
+        soft: [Lanes3; 3],
+        shear: Lanes,
+        particles: ParticleAccess,
+        accelerations: ParticleAccess,
+        step: Step,
+    ) {
+        let mut change = [Lanes3::default(); 3];
+        for i in 0..3 {
+            change[i] = rest[i] - soft[i].scaled(shear);
+            self.stress[i] = self.stress[i] + change[i];
+        }
+        self.act(corners, change, particles, accelerations, step.h2_s2);
+    }
+
+    /// Lets go of the stress that is not carried into the next substep.
+    #[inline(always)]
+    pub fn shed(&mut self, particles: ParticleAccess, accelerations: ParticleAccess, step: Step) {
+        let squared = inner(self.stress, self.stress);
+        let limit = Lanes::splat(step.carried_max_pa * step.carried_max_pa);
+        let within = limit.zip(squared, |limit, x| (limit / x.max(limit)).sqrt());
+        let kept = within * self.kept;
+        if kept.0.iter().all(|&share| share >= 1.0) {
+            return;
+        }
+        let mut change = [Lanes3::default(); 3];
+        for i in 0..3 {
+            change[i] = self.stress[i].scaled(kept - Lanes::splat(1.0));
+            self.stress[i] = self.stress[i].scaled(kept);
+        }
+        let corners = self.gather(particles);
+        self.act(&corners, change, particles, accelerations, 0.0);
+    }
+
+    /// Adds what the stress as it is does to the accelerations.
+    #[inline(always)]
+    pub fn accelerate_anew(&self, particles: ParticleAccess, accelerations: ParticleAccess) {
+        let corners = self.gather(particles);
+        self.act(&corners, self.stress, particles, accelerations, 0.0);
+    }
+
+    /// What is left of the equations, and who is wrecked. A body on its way back must do better
+    /// than not being inside out: `volume_share_min`.
+    #[inline(always)]
+    pub fn standing(
+        &self,
+        particles: ParticleAccess,
+        step: Step,
+        volume_share_min: f32,
+    ) -> Standing {
+        let Deformation { f, cofactor, j } = self.deformation(&self.gather(particles));
+        let volumetric = (j - Lanes::splat(1.0)).times(step.bulk_pa) - Lanes::splat(step.mu_pa);
+        let mut rest = [Lanes3::default(); 3];
+        for i in 0..3 {
+            rest[i] = f[i].times(step.mu_pa) + cofactor[i].scaled(volumetric) - self.stress[i];
+        }
+        let squared = inner(f, f);
+        // A lane that is not used has no volume and is nobody's wreck. Written so that NaN is one.
+        let mut wrecked = Lanes::splat(1.0);
+        for lane in 0..LANES {
+            let fine = j.0[lane] >= volume_share_min
+                && squared.0[lane] >= SQUARED_MIN
+                && squared.0[lane] <= SQUARED_MAX;
+            if fine || self.volume_m3.0[lane] == 0.0 {
+                wrecked.0[lane] = 0.0;
+            }
+        }
+        Standing {
+            residual_squared: inner(rest, rest),
+            wrecked,
+        }
+    }
+}
+
+/// Columns times a vector.
+#[inline(always)]
+fn along(columns: [Lanes3; 3], vector: Lanes3) -> Lanes3 {
+    columns[0].scaled(vector.x) + columns[1].scaled(vector.y) + columns[2].scaled(vector.z)
+}
+
+/// Edges from corner 0.
+#[inline(always)]
+fn edges(corners: &[Corner; 4]) -> [Lanes3; 3] {
+    let origin = corners[0].position;
+    [
+        corners[1].position - origin,
+        corners[2].position - origin,
+        corners[3].position - origin,
+    ]
+}
+
+/// Sum of the products of all nine entries.
+#[inline(always)]
+fn inner(a: [Lanes3; 3], b: [Lanes3; 3]) -> Lanes {
+    a[0].dot(b[0]) + a[1].dot(b[1]) + a[2].dot(b[2])
+}
