@@ -9,7 +9,7 @@
 )]
 
 use super::team::{SharedSlice, Team};
-use glam::{Mat4, Vec4};
+use glam::Vec4;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Constraints a batch.
@@ -202,13 +202,13 @@ impl ParticleAccess {
         }
     }
 
-    /// Reads one corner of eight constraints.
+    /// Reads one corner of eight constraints. `WIDE` is for code compiled for AVX.
     #[inline(always)]
-    pub fn gather(self, corner: &[u32; LANES]) -> Corner {
+    pub fn gather<const WIDE: bool>(self, corner: &[u32; LANES]) -> Corner {
         // SAFETY: indices were checked when the batches were made, and no other batch that runs now
         // writes these particles.
         let rows = corner.map(|index| unsafe { *self.first.add(index as usize) });
-        let [x, y, z, inverse_mass] = columns_of(rows);
+        let [x, y, z, inverse_mass] = columns_of::<WIDE>(rows);
         Corner {
             position: Lanes3 { x, y, z },
             inverse_mass,
@@ -236,8 +236,14 @@ impl ParticleAccess {
     /// Adds `change` to one corner of eight constraints and `factor` times it to the same corner
     /// in `other`; the fourth numbers stay.
     #[inline(always)]
-    pub fn add(self, corner: &[u32; LANES], change: Lanes3, other: Self, factor: f32) {
-        let rows = rows_of(change);
+    pub fn add<const WIDE: bool>(
+        self,
+        corner: &[u32; LANES],
+        change: Lanes3,
+        other: Self,
+        factor: f32,
+    ) {
+        let rows = rows_of::<WIDE>(change);
         for lane in 0..LANES {
             let index = corner[lane] as usize;
             // SAFETY: as in `gather`.
@@ -251,46 +257,89 @@ impl ParticleAccess {
 
 /// Four columns of eight from eight rows of four.
 #[inline(always)]
-fn columns_of(rows: [Vec4; LANES]) -> [Lanes; 4] {
-    let low = transposed([rows[0], rows[1], rows[2], rows[3]]);
-    let high = transposed([rows[4], rows[5], rows[6], rows[7]]);
-    [
-        joined(low[0], high[0]),
-        joined(low[1], high[1]),
-        joined(low[2], high[2]),
-        joined(low[3], high[3]),
-    ]
+fn columns_of<const WIDE: bool>(rows: [Vec4; LANES]) -> [Lanes; 4] {
+    #[cfg(target_arch = "x86_64")]
+    if WIDE {
+        // SAFETY: `WIDE` is for code that runs where AVX is.
+        return unsafe { wide::columns_of(rows) };
+    }
+    let mut columns = [Lanes::default(); 4];
+    for lane in 0..LANES {
+        for column in 0..4 {
+            columns[column].0[lane] = rows[lane][column];
+        }
+    }
+    columns
 }
 
 /// Eight rows of four, the fourth 0, from three columns of eight.
 #[inline(always)]
-fn rows_of(columns: Lanes3) -> [Vec4; LANES] {
-    let [x, y, z] = [columns.x, columns.y, columns.z].map(halves);
-    let low = transposed([x[0], y[0], z[0], Vec4::ZERO]);
-    let high = transposed([x[1], y[1], z[1], Vec4::ZERO]);
-    [
-        low[0], low[1], low[2], low[3], high[0], high[1], high[2], high[3],
-    ]
+fn rows_of<const WIDE: bool>(columns: Lanes3) -> [Vec4; LANES] {
+    #[cfg(target_arch = "x86_64")]
+    if WIDE {
+        // SAFETY: `WIDE` is for code that runs where AVX is.
+        return unsafe { wide::rows_of(columns) };
+    }
+    let Lanes3 { x, y, z } = columns;
+    std::array::from_fn(|lane| Vec4::new(x.0[lane], y.0[lane], z.0[lane], 0.0))
 }
 
-/// The transpose of a 4×4 matrix of rows: glam has it in the shuffles of the machine, where loops
-/// over single numbers compile to one insertion each.
-#[inline(always)]
-fn transposed(rows: [Vec4; 4]) -> [Vec4; 4] {
-    let matrix = Mat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose();
-    [matrix.x_axis, matrix.y_axis, matrix.z_axis, matrix.w_axis]
-}
+/// The two transposes in the shuffles of AVX; left to the compiler they are an insertion a number.
+#[cfg(target_arch = "x86_64")]
+mod wide {
+    use super::{LANES, Lanes, Lanes3, Vec4};
+    use std::arch::x86_64::*;
 
-#[inline(always)]
-fn joined(low: Vec4, high: Vec4) -> Lanes {
-    let ([a, b, c, d], [e, f, g, h]) = (low.to_array(), high.to_array());
-    Lanes([a, b, c, d, e, f, g, h])
-}
+    #[inline]
+    #[target_feature(enable = "avx")]
+    pub fn columns_of(rows: [Vec4; LANES]) -> [Lanes; 4] {
+        let r = rows.map(__m128::from);
+        let a = _mm256_set_m128(r[4], r[0]);
+        let b = _mm256_set_m128(r[5], r[1]);
+        let c = _mm256_set_m128(r[6], r[2]);
+        let d = _mm256_set_m128(r[7], r[3]);
+        let (ab_low, ab_high) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+        let (cd_low, cd_high) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+        [
+            lanes(_mm256_shuffle_ps::<0x44>(ab_low, cd_low)),
+            lanes(_mm256_shuffle_ps::<0xEE>(ab_low, cd_low)),
+            lanes(_mm256_shuffle_ps::<0x44>(ab_high, cd_high)),
+            lanes(_mm256_shuffle_ps::<0xEE>(ab_high, cd_high)),
+        ]
+    }
 
-#[inline(always)]
-fn halves(lanes: Lanes) -> [Vec4; 2] {
-    let [a, b, c, d, e, f, g, h] = lanes.0;
-    [Vec4::new(a, b, c, d), Vec4::new(e, f, g, h)]
+    #[inline]
+    #[target_feature(enable = "avx")]
+    pub fn rows_of(columns: Lanes3) -> [Vec4; LANES] {
+        let Lanes3 { x, y, z } = columns;
+        let (x, y, z, zero) = (vector(x), vector(y), vector(z), _mm256_setzero_ps());
+        let (xy_low, xy_high) = (_mm256_unpacklo_ps(x, y), _mm256_unpackhi_ps(x, y));
+        let (z_low, z_high) = (_mm256_unpacklo_ps(z, zero), _mm256_unpackhi_ps(z, zero));
+        let r = [
+            _mm256_shuffle_ps::<0x44>(xy_low, z_low),
+            _mm256_shuffle_ps::<0xEE>(xy_low, z_low),
+            _mm256_shuffle_ps::<0x44>(xy_high, z_high),
+            _mm256_shuffle_ps::<0xEE>(xy_high, z_high),
+        ];
+        // SAFETY: both are 32 f32.
+        let [[a, e], [b, f], [c, g], [d, h]] =
+            unsafe { std::mem::transmute::<[__m256; 4], [[Vec4; 2]; 4]>(r) };
+        [a, b, c, d, e, f, g, h]
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx")]
+    fn lanes(vector: __m256) -> Lanes {
+        // SAFETY: both are eight f32.
+        unsafe { std::mem::transmute::<__m256, Lanes>(vector) }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx")]
+    fn vector(lanes: Lanes) -> __m256 {
+        // SAFETY: both are eight f32.
+        unsafe { std::mem::transmute::<Lanes, __m256>(lanes) }
+    }
 }
 
 /// Batches of constraints sorted by colour.

@@ -41,6 +41,7 @@ use super::{
 use crate::geom::TetMesh;
 use glam::{DMat3, DVec3, Vec4};
 use kernel::{Batch, STIFFNESS_IN_MU, Step};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Largest h² V (λ+2μ) tr S, over the number of sweeps, whose stress is carried over whole; above,
 /// the share falls as its inverse. A uniform mesh of spacing d has about 6 (h c/d)² here, c being
@@ -68,6 +69,10 @@ pub struct NeoHookean {
     /// What the responses and shares of `tets` were made for.
     ready_for: Option<SolverParams>,
     step: Step,
+    /// Whether some tetrahedron carries only a share of its stress over.
+    sheds: bool,
+    /// Whether some stress was too large to be carried over after the last sweep.
+    overloaded: bool,
     /// Whether the body is wrecked and is led back to its last sound shape.
     restoring: bool,
 }
@@ -119,6 +124,8 @@ impl NeoHookean {
             sound: rest,
             ready_for: None,
             step: Step::default(),
+            sheds: false,
+            overloaded: false,
             restoring: false,
         }
     }
@@ -133,7 +140,7 @@ impl NeoHookean {
     ) -> &[Vec4] {
         if self.ready_for != Some(*params) {
             self.make_ready(team, particles, params);
-        } else {
+        } else if self.sheds || self.overloaded {
             let (step, places) = (self.step, reading(particles));
             self.tets
                 .for_each_colored(team, &mut self.accelerations, |run, accelerations| {
@@ -153,9 +160,13 @@ impl NeoHookean {
         } else {
             Work::Project
         };
+        let overloaded = AtomicBool::new(false);
         self.tets.for_each_colored(team, particles, |run, places| {
-            run_avx(run, work, places, accelerations, sound, step);
+            if run_avx(run, work, places, accelerations, sound, step) {
+                overloaded.store(true, Ordering::Relaxed);
+            }
         });
+        self.overloaded = overloaded.into_inner();
     }
 
     /// Forgets all stress: the body was put somewhere else. A wrecked one is led back from there.
@@ -204,6 +215,7 @@ impl NeoHookean {
         self.step = step;
         self.ready_for = Some(*params);
         let stiffness_max = CARRIED_STIFFNESS_MAX * params.iterations as f32;
+        self.sheds = false;
         for batch in self.tets.batches_mut() {
             for lane in 0..LANES {
                 let k = f64::from(step.h2_s2 * batch.volume_m3.0[lane]);
@@ -217,7 +229,8 @@ impl NeoHookean {
                 }
                 let trace = mobility.x_axis.x + mobility.y_axis.y + mobility.z_axis.z;
                 let stiffness = (k * trace) as f32 * (step.bulk_pa + step.mu_pa);
-                batch.kept.0[lane] = (stiffness_max / stiffness.max(stiffness_max)).min(1.0);
+                batch.kept.0[lane] = stiffness_max / stiffness.max(stiffness_max);
+                self.sheds |= stiffness > stiffness_max;
             }
         }
         self.accelerations.fill(Vec4::ZERO);
@@ -225,7 +238,7 @@ impl NeoHookean {
         self.tets
             .for_each_colored(team, &mut self.accelerations, |run, accelerations| {
                 for batch in run {
-                    batch.accelerate_anew(places, accelerations);
+                    batch.accelerate_anew::<false>(places, accelerations);
                 }
             });
     }
@@ -270,7 +283,8 @@ enum Work {
     Shed,
 }
 
-/// Works on one batch after the other, with the widest vectors the machine has.
+/// Works on one batch after the other, with the widest vectors the machine has. Returns whether a
+/// stress is too large to be carried over.
 fn run_avx(
     run: &mut [Batch],
     work: Work,
@@ -278,13 +292,13 @@ fn run_avx(
     accelerations: ParticleAccess,
     sound: ParticleAccess,
     step: Step,
-) {
+) -> bool {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the machine has AVX2.
         return unsafe { run_with_avx2(run, work, places, accelerations, sound, step) };
     }
-    run_batches(run, work, places, accelerations, sound, step);
+    run_batches::<false>(run, work, places, accelerations, sound, step)
 }
 
 /// The same code, compiled for eight lanes an instruction. No fused multiply-add: bits stay.
@@ -297,36 +311,39 @@ fn run_with_avx2(
     accelerations: ParticleAccess,
     sound: ParticleAccess,
     step: Step,
-) {
-    run_batches(run, work, places, accelerations, sound, step);
+) -> bool {
+    run_batches::<true>(run, work, places, accelerations, sound, step)
 }
 
 #[inline(always)]
-fn run_batches(
+fn run_batches<const WIDE: bool>(
     run: &mut [Batch],
     work: Work,
     places: ParticleAccess,
     accelerations: ParticleAccess,
     sound: ParticleAccess,
     step: Step,
-) {
+) -> bool {
+    // Loops and no closures: those are compiled for the narrow vectors of the base machine.
+    let mut over = false;
     match work {
         Work::Project => {
             for batch in run {
-                batch.project(places, accelerations, step);
+                over |= batch.project::<WIDE>(places, accelerations, step);
             }
         }
         Work::Restore => {
             for batch in run {
-                batch.restore(places, accelerations, sound, step);
+                over |= batch.restore::<WIDE>(places, accelerations, sound, step);
             }
         }
         Work::Shed => {
             for batch in run {
-                batch.shed(places, accelerations, step);
+                batch.shed::<WIDE>(places, accelerations, step);
             }
         }
     }
+    over
 }
 
 /// Sum of squares of what is left of the equations [Pa²], and the number of wrecked tetrahedra.
@@ -341,7 +358,7 @@ fn standing_of(
         // SAFETY: the machine has AVX2.
         return unsafe { standing_with_avx2(batches, places, step, volume_share_min) };
     }
-    add_standings(batches, places, step, volume_share_min)
+    add_standings::<false>(batches, places, step, volume_share_min)
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -352,11 +369,11 @@ fn standing_with_avx2(
     step: Step,
     volume_share_min: f32,
 ) -> (f64, usize) {
-    add_standings(batches, places, step, volume_share_min)
+    add_standings::<true>(batches, places, step, volume_share_min)
 }
 
 #[inline(always)]
-fn add_standings(
+fn add_standings<const WIDE: bool>(
     batches: &[Batch],
     places: ParticleAccess,
     step: Step,
@@ -365,7 +382,7 @@ fn add_standings(
     let mut squared_sum_pa2 = 0.0;
     let mut wrecked = 0.0;
     for batch in batches {
-        let standing = batch.standing(places, step, volume_share_min);
+        let standing = batch.standing::<WIDE>(places, step, volume_share_min);
         for lane in 0..LANES {
             squared_sum_pa2 += f64::from(standing.residual_squared.0[lane]);
             wrecked += standing.wrecked.0[lane];

@@ -141,14 +141,14 @@ impl Springs {
             }
         };
         for batch in self.edges.batches() {
-            let corners = [0, 1].map(|k| access.gather(&batch.corners[k]));
+            let corners = [0, 1].map(|k| access.gather::<false>(&batch.corners[k]));
             let residual = edge_value(batch, &corners).0
                 + batch.geometry.times(compliance.edge) * batch.lambda;
             add(&batch.corners[0], residual, batch.rest_length);
         }
         if let Some(compliance) = compliance.volume {
             for batch in self.volumes.batches() {
-                let corners = [0, 1, 2, 3].map(|k| access.gather(&batch.corners[k]));
+                let corners = [0, 1, 2, 3].map(|k| access.gather::<false>(&batch.corners[k]));
                 let residual = volume_value(batch, &corners).0
                     + batch.geometry.times(compliance) * batch.lambda;
                 add(&batch.corners[0], residual, batch.rest_volume);
@@ -213,8 +213,8 @@ fn edge_value(batch: &EdgeBatch, corners: &[Corner; 2]) -> (Lanes, Lanes3) {
 #[inline(always)]
 fn project_edge_batch(batch: &mut EdgeBatch, access: ParticleAccess, compliance: f32) {
     let mut corners = [
-        access.gather(&batch.corners[0]),
-        access.gather(&batch.corners[1]),
+        access.gather::<false>(&batch.corners[0]),
+        access.gather::<false>(&batch.corners[1]),
     ];
     let (value, direction) = edge_value(batch, &corners);
     let alpha = batch.geometry.times(compliance);
@@ -245,10 +245,10 @@ fn volume_value(batch: &VolumeBatch, corners: &[Corner; 4]) -> (Lanes, [Lanes3; 
 #[inline(always)]
 fn project_volume_batch(batch: &mut VolumeBatch, access: ParticleAccess, compliance: f32) {
     let mut corners = [
-        access.gather(&batch.corners[0]),
-        access.gather(&batch.corners[1]),
-        access.gather(&batch.corners[2]),
-        access.gather(&batch.corners[3]),
+        access.gather::<false>(&batch.corners[0]),
+        access.gather::<false>(&batch.corners[1]),
+        access.gather::<false>(&batch.corners[2]),
+        access.gather::<false>(&batch.corners[3]),
     ];
     let (value, gradient) = volume_value(batch, &corners);
     let alpha = batch.geometry.times(compliance);

@@ -57,12 +57,12 @@ pub struct Standing {
 
 impl Batch {
     #[inline(always)]
-    fn gather(&self, access: ParticleAccess) -> [Corner; 4] {
+    fn gather<const WIDE: bool>(&self, access: ParticleAccess) -> [Corner; 4] {
         [
-            access.gather(&self.corners[0]),
-            access.gather(&self.corners[1]),
-            access.gather(&self.corners[2]),
-            access.gather(&self.corners[3]),
+            access.gather::<WIDE>(&self.corners[0]),
+            access.gather::<WIDE>(&self.corners[1]),
+            access.gather::<WIDE>(&self.corners[2]),
+            access.gather::<WIDE>(&self.corners[3]),
         ]
     }
 
@@ -88,7 +88,7 @@ impl Batch {
     /// Lets a change D of the stress act: −V w D g on the acceleration of each corner, and h² times
     /// that on its place.
     #[inline(always)]
-    fn act(
+    fn act<const WIDE: bool>(
         &self,
         corners: &[Corner; 4],
         change: [Lanes3; 3],
@@ -102,11 +102,17 @@ impl Batch {
         let d2 = along(change, rows[1]);
         let d3 = along(change, rows[2]);
         let d0 = -(d1 + d2 + d3);
-        let d = [d0, d1, d2, d3];
-        for k in 0..4 {
-            let acceleration = d[k].scaled(v * corners[k].inverse_mass);
-            accelerations.add(&self.corners[k], acceleration, places, h2_s2);
-        }
+        let [a0, a1, a2, a3] = [
+            d0.scaled(v * corners[0].inverse_mass),
+            d1.scaled(v * corners[1].inverse_mass),
+            d2.scaled(v * corners[2].inverse_mass),
+            d3.scaled(v * corners[3].inverse_mass),
+        ];
+        // No loop: the compiler would keep it and send the lanes through memory.
+        accelerations.add::<WIDE>(&self.corners[0], a0, places, h2_s2);
+        accelerations.add::<WIDE>(&self.corners[1], a1, places, h2_s2);
+        accelerations.add::<WIDE>(&self.corners[2], a2, places, h2_s2);
+        accelerations.add::<WIDE>(&self.corners[3], a3, places, h2_s2);
     }
 
     /// Columns times the symmetric 3×3 response.
@@ -121,15 +127,16 @@ impl Batch {
         ]
     }
 
-    /// Moves stress and corners to where they fit each other, with the neighbours held.
+    /// Moves stress and corners to where they fit each other, with the neighbours held. Returns
+    /// whether a stress is too large to be carried over.
     #[inline(always)]
-    pub fn project(
+    pub fn project<const WIDE: bool>(
         &mut self,
         particles: ParticleAccess,
         accelerations: ParticleAccess,
         step: Step,
-    ) {
-        let corners = self.gather(particles);
+    ) -> bool {
+        let corners = self.gather::<WIDE>(particles);
         let Deformation { f, cofactor, j } = self.deformation(&corners);
         let volumetric = (j - Lanes::splat(1.0)).times(step.bulk_pa) - Lanes::splat(step.mu_pa);
         let k = self.volume_m3.times(step.h2_s2);
@@ -147,22 +154,22 @@ impl Batch {
             rest[i] = rest[i] - cofactor[i].scaled(share);
         }
         let soft = self.responded(rest);
-        self.settle(&corners, rest, soft, shear, particles, accelerations, step);
+        self.settle::<WIDE>(&corners, rest, soft, shear, particles, accelerations, step)
     }
 
     /// The same with another material, whose only rest is the shape that `sound` holds: convex, so
     /// that nothing is ever in the way back.
     #[inline(always)]
-    pub fn restore(
+    pub fn restore<const WIDE: bool>(
         &mut self,
         particles: ParticleAccess,
         accelerations: ParticleAccess,
         sound: ParticleAccess,
         step: Step,
-    ) {
-        let corners = self.gather(particles);
+    ) -> bool {
+        let corners = self.gather::<WIDE>(particles);
         let [a, b, c] = edges(&corners);
-        let [sound_a, sound_b, sound_c] = edges(&self.gather(sound));
+        let [sound_a, sound_b, sound_c] = edges(&self.gather::<WIDE>(sound));
         let change = self.gradient([a - sound_a, b - sound_b, c - sound_c]);
         let stiffness = STIFFNESS_IN_MU * step.mu_pa;
         let shear = self.volume_m3.times(step.h2_s2 * stiffness);
@@ -171,7 +178,7 @@ impl Batch {
             rest[i] = change[i].times(stiffness) - self.stress[i];
         }
         let soft = self.responded(rest);
-        self.settle(&corners, rest, soft, shear, particles, accelerations, step);
+        self.settle::<WIDE>(&corners, rest, soft, shear, particles, accelerations, step)
     }
 
     /// Applies the change of stress `rest − shear · soft`.
@@ -180,7 +187,7 @@ impl Batch {
         clippy::too_many_arguments,
         reason = "the tail of two kernels, inlined"
     )]
-    fn settle(
+    fn settle<const WIDE: bool>(
         &mut self,
         corners: &[Corner; 4],
         rest: [Lanes3; 3],
@@ -189,18 +196,30 @@ impl Batch {
         particles: ParticleAccess,
         accelerations: ParticleAccess,
         step: Step,
-    ) {
+    ) -> bool {
         let mut change = [Lanes3::default(); 3];
         for i in 0..3 {
             change[i] = rest[i] - soft[i].scaled(shear);
             self.stress[i] = self.stress[i] + change[i];
         }
-        self.act(corners, change, particles, accelerations, step.h2_s2);
+        self.act::<WIDE>(corners, change, particles, accelerations, step.h2_s2);
+        let squared = inner(self.stress, self.stress);
+        let limit = step.carried_max_pa * step.carried_max_pa;
+        let mut over = false;
+        for lane in 0..LANES {
+            over |= squared.0[lane] > limit;
+        }
+        over
     }
 
     /// Lets go of the stress that is not carried into the next substep.
     #[inline(always)]
-    pub fn shed(&mut self, particles: ParticleAccess, accelerations: ParticleAccess, step: Step) {
+    pub fn shed<const WIDE: bool>(
+        &mut self,
+        particles: ParticleAccess,
+        accelerations: ParticleAccess,
+        step: Step,
+    ) {
         let squared = inner(self.stress, self.stress);
         let limit = Lanes::splat(step.carried_max_pa * step.carried_max_pa);
         let within = limit.zip(squared, |limit, x| (limit / x.max(limit)).sqrt());
@@ -213,27 +232,31 @@ impl Batch {
             change[i] = self.stress[i].scaled(kept - Lanes::splat(1.0));
             self.stress[i] = self.stress[i].scaled(kept);
         }
-        let corners = self.gather(particles);
-        self.act(&corners, change, particles, accelerations, 0.0);
+        let corners = self.gather::<WIDE>(particles);
+        self.act::<WIDE>(&corners, change, particles, accelerations, 0.0);
     }
 
     /// Adds what the stress as it is does to the accelerations.
     #[inline(always)]
-    pub fn accelerate_anew(&self, particles: ParticleAccess, accelerations: ParticleAccess) {
-        let corners = self.gather(particles);
-        self.act(&corners, self.stress, particles, accelerations, 0.0);
+    pub fn accelerate_anew<const WIDE: bool>(
+        &self,
+        particles: ParticleAccess,
+        accelerations: ParticleAccess,
+    ) {
+        let corners = self.gather::<WIDE>(particles);
+        self.act::<WIDE>(&corners, self.stress, particles, accelerations, 0.0);
     }
 
     /// What is left of the equations, and who is wrecked. A body on its way back must do better
     /// than not being inside out: `volume_share_min`.
     #[inline(always)]
-    pub fn standing(
+    pub fn standing<const WIDE: bool>(
         &self,
         particles: ParticleAccess,
         step: Step,
         volume_share_min: f32,
     ) -> Standing {
-        let Deformation { f, cofactor, j } = self.deformation(&self.gather(particles));
+        let Deformation { f, cofactor, j } = self.deformation(&self.gather::<WIDE>(particles));
         let volumetric = (j - Lanes::splat(1.0)).times(step.bulk_pa) - Lanes::splat(step.mu_pa);
         let mut rest = [Lanes3::default(); 3];
         for i in 0..3 {
