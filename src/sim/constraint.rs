@@ -6,9 +6,10 @@
 //!
 //! Sources: Macklin, Müller, Chentanez, "XPBD: Position-Based Simulation of Compliant Constrained
 //! Dynamics", MIG 2016; Smith, de Goes, Kim, "Stable Neo-Hookean Flesh Simulation", ACM TOG 37,
-//! 2018 (the energy). Its split into two constraints is derived at [`shape`].
+//! 2018 (the energy).
 
-use glam::{Mat3, Vec3};
+use super::Lame;
+use glam::{DMat3, Vec3};
 
 /// C(x) and ∂C/∂xᵢ for the `N` particles of one constraint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,8 +22,6 @@ pub struct Linearized<const N: usize> {
 
 /// Edges shorter than this have no direction [m].
 pub const LENGTH_MIN_M: f32 = 1e-9;
-/// Below this C² of [`shape`] is rounding and has no direction.
-pub const SHAPE_SQUARED_MIN: f32 = 1e-12;
 
 /// Edge length minus its rest length [m]. `None` if the two particles coincide.
 pub fn distance(x: [Vec3; 2], rest_length_m: f32) -> Option<Linearized<2>> {
@@ -48,71 +47,29 @@ pub fn volume(x: [Vec3; 4], rest_volume_m3: f32) -> Linearized<4> {
     }
 }
 
-/// Relative change of volume, J − 1 with J = det F.
+/// Energy density of stable neo-Hookean tissue [Pa], 0 at rest and in every rotation of it:
 ///
-/// `rest_inverse` is the inverse of the matrix whose columns are the edges from corner 0 at rest.
-pub fn dilation(x: [Vec3; 4], rest_inverse: Mat3) -> Linearized<4> {
-    let [a, b, c] = edges(x);
-    let scale = rest_inverse.determinant();
-    Linearized {
-        value: scale * a.dot(b.cross(c)) - 1.0,
-        gradient: with_first([b.cross(c), c.cross(a), a.cross(b)].map(|g| scale * g)),
-    }
+/// ψ = μ/2 (tr FᵀF − 3) − μ (J − 1) + (λ+μ)/2 (J − 1)²   with J = det F.
+///
+/// Smith, de Goes, Kim 2018, equation 14, with the constant that makes the energy of rest zero and
+/// λ+μ for their λ, so that small strains see Lamé's moduli.
+pub fn energy_density_pa(f: DMat3, lame: Lame) -> f64 {
+    let (mu, lambda) = (f64::from(lame.mu_pa), f64::from(lame.lambda_pa));
+    let dilation = f.determinant() - 1.0;
+    let squared: f64 = f.to_cols_array().iter().map(|x| x * x).sum();
+    0.5 * mu * (squared - 3.0) - mu * dilation + 0.5 * (lambda + mu) * dilation * dilation
 }
 
-/// Change of shape, √(tr FᵀF + J² − 4J): 0 at rest and in every rotation of it, √2·‖ε‖ for a small
-/// strain ε. `None` where it is 0 to within rounding and has no direction.
-///
-/// Stable neo-Hookean tissue has the energy density
-/// ψ = μ/2 (tr FᵀF − 3) − μ (J − 1) + (λ+μ)/2 (J − 1)², with its rest at F = 1. Moved together
-/// differently that is
-///
-/// ψ = μ/2 (tr FᵀF + J² − 4J) + λ/2 (J − 1)²,
-///
-/// two terms of which neither is ever negative and both are 0 at rest (the first by
-/// tr FᵀF ≥ 3 J^⅔). So each is half the square of a constraint, and a body at rest is at rest for
-/// both. The usual pair √(tr FᵀF) and J − 1 − μ/λ has the same sum, but its two forces only cancel.
-///
-/// With S = FᵀF − 1, whose entries are small at rest, the root is 2(J−1)² − II(S) − III(S), of
-/// second order without cancellation; single precision needs that for strains below 10⁻³.
-pub fn shape(x: [Vec3; 4], rest_inverse: Mat3) -> Option<Linearized<4>> {
-    let [a, b, c] = edges(x);
-    let f = Mat3::from_cols(a, b, c) * rest_inverse;
-    let j = f.determinant();
-    let squared = shape_squared(f, j);
-    if squared < SHAPE_SQUARED_MIN {
-        return None;
-    }
-    let value = squared.sqrt();
-    // ∂C/∂F = (F + (J − 2) cof F) / C, and ∂F/∂xₖ picks row k of the rest inverse.
-    let cofactor = Mat3::from_cols(
+/// First Piola-Kirchhoff stress P = ∂ψ/∂F [Pa] of [`energy_density_pa`]:
+/// μ F + ((λ+μ)(J − 1) − μ) cof F. The constraint of `neo_hookean` is that the multipliers be it.
+pub fn stress_pa(f: DMat3, lame: Lame) -> DMat3 {
+    let (mu, lambda) = (f64::from(lame.mu_pa), f64::from(lame.lambda_pa));
+    let cofactor = DMat3::from_cols(
         f.y_axis.cross(f.z_axis),
         f.z_axis.cross(f.x_axis),
         f.x_axis.cross(f.y_axis),
     );
-    let stress = (f + (j - 2.0) * cofactor) * (1.0 / value);
-    let rows = rest_inverse.transpose();
-    Some(Linearized {
-        value,
-        gradient: with_first([rows.x_axis, rows.y_axis, rows.z_axis].map(|row| stress * row)),
-    })
-}
-
-/// C² of [`shape`], not below 0.
-fn shape_squared(f: Mat3, j: f32) -> f32 {
-    let c = f.transpose() * f;
-    let trace = c.x_axis.x + c.y_axis.y + c.z_axis.z;
-    // The invariants of S lose more than they save once S is large.
-    let squared = if trace < 4.0 {
-        let s = c - Mat3::IDENTITY;
-        let (xx, yy, zz) = (s.x_axis.x, s.y_axis.y, s.z_axis.z);
-        let (xy, yz, zx) = (s.x_axis.y, s.y_axis.z, s.z_axis.x);
-        let second = xx * yy + yy * zz + zz * xx - xy * xy - yz * yz - zx * zx;
-        2.0 * (j - 1.0) * (j - 1.0) - second - s.determinant()
-    } else {
-        trace + j * j - 4.0 * j
-    };
-    squared.max(0.0)
+    f * mu + cofactor * ((lambda + mu) * (f.determinant() - 1.0) - mu)
 }
 
 /// Edges from corner 0.
@@ -128,7 +85,7 @@ fn with_first([g1, g2, g3]: [Vec3; 3]) -> [Vec3; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::Quat;
+    use glam::DVec3;
     use proptest::prelude::*;
 
     const CORNERS: [Vec3; 4] = [
@@ -137,12 +94,10 @@ mod tests {
         Vec3::new(0.0, 0.9, 0.1),
         Vec3::new(0.1, -0.1, 1.2),
     ];
-    const REST: [Vec3; 4] = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
-
-    fn rest_inverse(rest: [Vec3; 4]) -> Mat3 {
-        let [a, b, c] = edges(rest);
-        Mat3::from_cols(a, b, c).inverse()
-    }
+    const LAME: Lame = Lame {
+        mu_pa: 3.0,
+        lambda_pa: 20.0,
+    };
 
     /// Largest difference between gradient and central differences, relative to the gradient.
     fn gradient_error<const N: usize>(x: [Vec3; N], c: impl Fn([Vec3; N]) -> Linearized<N>) -> f32 {
@@ -179,27 +134,38 @@ mod tests {
         assert!(error < TOLERANCE, "relative gradient error {error}");
     }
 
-    #[test]
-    fn dilation_gradient_matches_central_differences() {
-        let inverse = rest_inverse(REST);
-        let error = gradient_error(CORNERS, |x| dilation(x, inverse));
-        assert!(error < TOLERANCE, "relative gradient error {error}");
+    /// Largest difference between stress and central differences of the energy, over the stress.
+    fn stress_error(f: DMat3, stress: impl Fn(DMat3) -> DMat3) -> f64 {
+        const STEP: f64 = 1e-5;
+        let exact = stress(f).to_cols_array();
+        let mut worst = 0.0_f64;
+        for entry in 0..9 {
+            let moved = |by: f64| {
+                let mut entries = f.to_cols_array();
+                entries[entry] += by;
+                energy_density_pa(DMat3::from_cols_array(&entries), LAME)
+            };
+            let slope = (moved(STEP) - moved(-STEP)) / (2.0 * STEP);
+            worst = worst.max((slope - exact[entry]).abs());
+        }
+        worst
+            / exact
+                .iter()
+                .fold(1.0, |largest: f64, x| largest.max(x.abs()))
     }
 
+    // Central differences in f64: rounding 1e-16/1e-5 of an energy of some hundreds, and the third
+    // derivative, some hundreds too, times 1e-10.
+    const STRESS_TOLERANCE: f64 = 1e-6;
+
     #[test]
-    fn shape_gradient_matches_central_differences_near_rest_far_from_it_and_inverted() {
-        let inverse = rest_inverse(REST);
-        for (name, scale) in [
-            ("near", Vec3::ONE),
-            ("stretched", Vec3::new(3.0, 1.0, 0.5)),
-            ("inverted", Vec3::new(1.0, -1.0, 1.0)),
-            ("flat", Vec3::new(1.0, 0.0, 1.0)),
-        ] {
-            let error = gradient_error(CORNERS.map(|x| x * scale), |x| {
-                shape(x, inverse).expect("the tetrahedron is deformed")
-            });
-            assert!(error < TOLERANCE, "{name}: relative gradient error {error}");
-        }
+    fn stress_check_rejects_lame_moduli_in_the_wrong_place() {
+        let f = DMat3::from_diagonal(DVec3::new(1.2, 0.9, 1.0));
+        let swapped = Lame {
+            mu_pa: LAME.lambda_pa,
+            lambda_pa: LAME.mu_pa,
+        };
+        assert!(stress_error(f, |f| stress_pa(f, swapped)) > 0.1);
     }
 
     #[test]
@@ -217,64 +183,43 @@ mod tests {
         assert_eq!(distance([Vec3::ONE, Vec3::ONE], 0.5), None);
     }
 
-    #[test]
-    fn collapsed_tetrahedron_has_no_shape_direction() {
-        assert_eq!(shape([Vec3::ONE; 4], rest_inverse(REST)), None);
-    }
-
-    /// Stable neo-Hookean energy density as it is published, in f64.
-    fn published_density(x: [Vec3; 4], inverse: Mat3, mu: f64, lambda: f64) -> f64 {
-        let [a, b, c] = edges(x);
-        let f = glam::Mat3::from_cols(a, b, c).as_dmat3() * inverse.as_dmat3();
-        let j = f.determinant();
-        let c = f.transpose() * f;
-        let trace = c.x_axis.x + c.y_axis.y + c.z_axis.z;
-        mu / 2.0 * (trace - 3.0) - mu * (j - 1.0) + (lambda + mu) / 2.0 * (j - 1.0).powi(2)
-    }
-
     proptest! {
         #[test]
-        fn shape_and_dilation_add_up_to_the_stable_neo_hookean_energy(
-            moves in proptest::array::uniform12(-0.8_f32..0.8),
+        fn stress_matches_central_differences_of_the_energy(
+            entries in proptest::array::uniform9(-2.0_f64..2.0),
         ) {
-            let (mu, lambda) = (3.0, 20.0);
-            let inverse = rest_inverse(REST);
-            let x = std::array::from_fn(|k| {
-                REST[k] + Vec3::new(moves[3 * k], moves[3 * k + 1], moves[3 * k + 2])
-            });
-            let c_shape = f64::from(shape(x, inverse).map_or(0.0, |c| c.value));
-            let c_dilation = f64::from(dilation(x, inverse).value);
-            let split = mu / 2.0 * c_shape.powi(2) + lambda / 2.0 * c_dilation.powi(2);
-            let published = published_density(x, inverse, mu, lambda);
-            // f32 against f64 on values up to about 300.
-            prop_assert!((split - published).abs() < 1e-4 * (1.0 + published), "{split} {published}");
+            let error = stress_error(DMat3::from_cols_array(&entries), |f| stress_pa(f, LAME));
+            prop_assert!(error < STRESS_TOLERANCE, "{error}");
         }
 
         #[test]
-        fn shape_is_zero_in_every_rotation_of_rest(
-            axis in (-1.0_f32..1.0, -1.0_f32..1.0, -1.0_f32..1.0), angle in -3.0_f32..3.0,
+        fn rest_has_no_energy_and_no_stress_in_any_rotation(
+            axis in (-1.0_f64..1.0, -1.0_f64..1.0, -1.0_f64..1.0), angle in -3.0_f64..3.0,
         ) {
-            let axis = Vec3::from(axis).try_normalize().unwrap_or(Vec3::X);
-            let turn = Quat::from_axis_angle(axis, angle);
-            let x = CORNERS.map(|corner| turn * corner + Vec3::new(0.3, -0.2, 0.1));
-            let value = shape(x, rest_inverse(CORNERS)).map_or(0.0, |c| c.value);
-            // A strain of a few rounding errors of the coordinates, 6e-8 each.
-            prop_assert!(value < 2e-6, "{value}");
+            let axis = DVec3::from(axis).try_normalize().unwrap_or(DVec3::X);
+            let turn = DMat3::from_axis_angle(axis, angle);
+            let stress = stress_pa(turn, LAME).to_cols_array();
+            // Rounding of numbers up to μ + λ.
+            prop_assert!(energy_density_pa(turn, LAME).abs() < 1e-13);
+            prop_assert!(stress.iter().all(|x| x.abs() < 1e-13), "{stress:?}");
         }
     }
 
     #[test]
-    fn small_shear_gives_root_two_times_the_strain() {
-        let inverse = rest_inverse(REST);
-        for shear in [1e-5_f32, 1e-4, 1e-3, 1e-2] {
-            let x = REST.map(|corner| corner + Vec3::X * shear * corner.y);
-            let value = shape(x, inverse)
-                .expect("the shear is above rounding")
-                .value;
-            // ε has the two entries shear/2, so √2·‖ε‖ is the shear itself. Higher terms are of
-            // the order of its square; rounding of S is 1e-7 absolute.
-            let error = (value - shear).abs();
-            assert!(error < shear * shear + 3e-7, "shear {shear} gives {value}");
+    fn small_strains_see_lame_moduli() {
+        for size in [1e-6, 1e-4] {
+            let strain =
+                DMat3::from_cols_array(&[3.0, 1.0, 0.5, 1.0, -2.0, 0.2, 0.5, 0.2, 1.0]) * size;
+            let trace = 2.0 * size;
+            let expected = strain * (2.0 * f64::from(LAME.mu_pa))
+                + DMat3::IDENTITY * (f64::from(LAME.lambda_pa) * trace);
+            let error = stress_pa(DMat3::IDENTITY + strain, LAME) - expected;
+            // The next order of the strain, with moduli of 20 and some nine terms.
+            let bound = 1000.0 * size * size;
+            assert!(
+                error.to_cols_array().iter().all(|x| x.abs() < bound),
+                "{error}"
+            );
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{Method, Simulation, constraint, mass_spring};
 use crate::geom::TetMesh;
-use glam::{DVec3, Mat3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 
 /// Volume of a tetrahedron at rest [m³], signed.
 pub fn rest_volume_m3(mesh: &TetMesh, tet: usize) -> f64 {
@@ -57,7 +57,7 @@ pub fn energy(simulation: &Simulation) -> Energy {
     }
 }
 
-/// Σ C²/2α over what the method has; held to `constraint`, not to the kernels.
+/// Energy of what the method has; held to `constraint`, not to the kernels.
 fn elastic_energy_j(simulation: &Simulation) -> f64 {
     let (setup, params) = (simulation.setup(), simulation.params());
     let (mesh, sound) = (&setup.tets, simulation.sound_tets());
@@ -96,12 +96,12 @@ fn elastic_energy_j(simulation: &Simulation) -> f64 {
                 })
         }
         Method::XpbdNeoHookean => tets(&|x, volume, tet| {
-            let [a, b, c, d] = mesh.tets[tet as usize].map(|i| mesh.particles[i as usize]);
-            let inverse = Mat3::from_cols(b - a, c - a, d - a).inverse();
-            let shape = constraint::shape(x, inverse).map_or(0.0, |c| f64::from(c.value));
-            let dilation = f64::from(constraint::dilation(x, inverse).value);
-            let (mu, lambda) = (f64::from(lame.mu_pa), f64::from(lame.lambda_pa));
-            0.5 * volume * (mu * shape.powi(2) + lambda * dilation.powi(2))
+            let [a, b, c, d] =
+                mesh.tets[tet as usize].map(|i| mesh.particles[i as usize].as_dvec3());
+            let rest = DMat3::from_cols(b - a, c - a, d - a);
+            let [p, q, r, s] = x.map(Vec3::as_dvec3);
+            let f = DMat3::from_cols(q - p, r - p, s - p) * rest.inverse();
+            volume * constraint::energy_density_pa(f, lame)
         }),
     }
 }

@@ -390,3 +390,6 @@ fn add_standings<const WIDE: bool>(
     }
     (squared_sum_pa2, wrecked as usize)
 }
+
+#[cfg(test)]
+mod tests;

@@ -117,7 +117,7 @@ fn sag_over_theory(method: Method, substeps: u32, poisson_ratio: f32) -> f32 {
 #[test]
 fn hanging_bar_sags_by_the_closed_form() {
     // Of the closed form 1 for a thin bar: the clamped end is stiffer by a few per cent, tetrahedra
-    // of constant strain by a few more; too few substeps make it softer (1.03 at 40, 0.98 at 100).
+    // of constant strain by a few more.
     let neo_hookean = sag_over_theory(Method::XpbdNeoHookean, 60, 0.45);
     assert!((0.95..1.05).contains(&neo_hookean), "{neo_hookean}");
     // Springs along edges are no isotropic body: 0.83 measured for both.
@@ -128,11 +128,15 @@ fn hanging_bar_sags_by_the_closed_form() {
 }
 
 #[test]
-fn too_few_substeps_make_the_bar_too_soft_by_a_factor_that_falls_fourfold_as_they_double() {
-    let excess = |substeps| sag_over_theory(Method::XpbdNeoHookean, substeps, 0.45) - 0.975;
-    let ratio = excess(10) / excess(20);
-    // Second order in the substep: 4.2 measured.
-    assert!((3.0..6.0).contains(&ratio), "{ratio}");
+fn a_settled_bar_hangs_the_same_however_few_its_substeps() {
+    let of = |substeps| sag_over_theory(Method::XpbdNeoHookean, substeps, 0.45);
+    let long = of(60);
+    for substeps in [15, 20] {
+        // Carried over whole, the stress is in balance at any substep; what is left is the last of
+        // the swing after two seconds. Started from zero it was 6 % too soft at 20.
+        let error = of(substeps) / long - 1.0;
+        assert!(error.abs() < 1e-3, "{substeps} substeps: {error}");
+    }
 }
 
 #[test]
