@@ -164,6 +164,11 @@ impl Session {
         self.simulation.points()
     }
 
+    /// The body in time.
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
     /// Number of tetrahedra.
     pub fn tet_count(&self) -> usize {
         self.simulation.tet_count()

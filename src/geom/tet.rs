@@ -90,6 +90,20 @@ pub struct Skin {
     pub triangles: Vec<[u32; 3]>,
 }
 
+impl Skin {
+    /// V − E + F: 2 for every closed surface without handles, 0 for a torus. Edges are those that
+    /// some triangle has.
+    pub fn euler_number(&self) -> i64 {
+        let mut edges: Vec<[u32; 2]> = (self.triangles.iter())
+            .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
+            .map(|[a, b]| [a.min(b), a.max(b)])
+            .collect();
+        edges.sort_unstable();
+        edges.dedup();
+        self.particles.len() as i64 - edges.len() as i64 + self.triangles.len() as i64
+    }
+}
+
 /// The faces of `mesh` that belong to one tetrahedron only, with one point a particle.
 pub fn skin(mesh: &TetMesh) -> Skin {
     let faces = boundary_triangles(mesh);
@@ -159,6 +173,7 @@ mod tests {
         assert_eq!(skin.triangles.len(), 2 * 2 * (12 + 8 + 6));
         assert!((crate::geom::volume_m3(&points, &skin.triangles) - 24.0).abs() < 1e-6);
         assert!(skin.particles.is_sorted());
+        assert_eq!(skin.euler_number(), 2);
     }
 
     #[test]
