@@ -1,9 +1,10 @@
-//! The bundled organs are what the code makes, byte for byte.
+//! The bundled organs and specimens are what the code makes, byte for byte.
 //!
 //! `PALPATE_ACCEPT=1 cargo test --test bundled_organs` makes the files again; commit what it
 //! writes together with the change that made it necessary.
 
 use palpate::geom::organ::{BundledFile, Organ, bundled_files};
+use palpate::geom::specimen::Specimen;
 use std::path::{Path, PathBuf};
 
 fn scenes() -> PathBuf {
@@ -37,7 +38,9 @@ fn accept(made: &BundledFile) {
 
 #[test]
 fn bundled_files_are_what_the_code_makes_byte_for_byte() {
-    let made: Vec<BundledFile> = Organ::ALL.into_iter().flat_map(bundled_files).collect();
+    let made: Vec<BundledFile> = (Organ::ALL.into_iter().flat_map(bundled_files))
+        .chain(Specimen::ALL.map(Specimen::bundled_file))
+        .collect();
     if std::env::var_os("PALPATE_ACCEPT").is_some() {
         made.iter().for_each(accept);
         let total: usize = made.iter().map(|file| file.bytes.len()).sum();

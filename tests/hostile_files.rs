@@ -1,16 +1,21 @@
-//! Surface files that are broken, cyclic, huge by their own claim, empty or random: each ends in a
-//! surface or in an error that names the file, never in a panic, a hang or a blow-up.
+//! Surface and tet files that are broken, cyclic, huge by their own claim, empty or random: each ends in a
+//! mesh or in an error that names the file, never in a panic, a hang or a blow-up.
+
+#[path = "support/tets.rs"]
+mod tets;
 
 use glam::{Vec2, Vec3};
-use palpate::geom::SurfaceMesh;
 use palpate::geom::export::{GlbMaterial, glb_bytes};
 use palpate::geom::import::{
-    ImportError, ImportOptions, ImportedSurface, UvState, describe, read_parts, read_surface,
+    ImportError, ImportOptions, ImportedSurface, ImportedTets, UvState, describe, read_parts,
+    read_surface, read_tets, read_tets_bytes,
 };
+use palpate::geom::{SurfaceMesh, tet};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
+use tets::cube as cube_of_tets;
 
 /// A folder of its own for each test, gone when the test ends well.
 struct Folder(PathBuf);
@@ -607,4 +612,125 @@ fn meshes_can_be_chosen_by_name_and_unknown_names_list_the_known() {
     assert_eq!(shell.meshes_used.len(), 2);
     let error = read_surface(&liver, &named(&["pancreas"])).expect_err("there is none");
     assert!(error.to_string().contains("VH_F_caudate_lobe"), "{error}");
+}
+
+/// Reads tetrahedra from `bytes`; a refusal names the file and says something.
+fn read_tetrahedra(bytes: &[u8]) -> Option<ImportedTets> {
+    match read_tets_bytes(Path::new("hostile.msh"), bytes) {
+        Ok(imported) => {
+            assert_partition(&imported);
+            Some(imported)
+        }
+        Err(error) => {
+            let message = error.to_string();
+            assert!(message.starts_with("hostile.msh: "), "{message}");
+            assert!(message.len() < 1000, "{message}");
+            None
+        }
+    }
+}
+
+/// What a simulation relies on: finite places, corners in range, positive volumes, none unused.
+fn assert_partition(imported: &ImportedTets) {
+    let mesh = &imported.mesh;
+    assert!(!mesh.tets.is_empty());
+    assert!(mesh.particles.iter().all(|x| x.is_finite()));
+    let mut used = vec![false; mesh.particles.len()];
+    for (tet, corners) in mesh.tets.iter().enumerate() {
+        assert!(tet::volume_m3(tet::corners(mesh, tet)) > 0.0);
+        for &corner in corners {
+            used[corner as usize] = true;
+        }
+    }
+    assert!(used.iter().all(|&used| used));
+}
+
+#[test]
+fn tetrahedra_cut_short_anywhere_are_refused() {
+    for (format, text) in cube_of_tets().formats() {
+        assert!(read_tetrahedra(text.as_bytes()).is_some());
+        // Only the end of the last line may be missing.
+        for length in 0..text.trim_end().len() {
+            let cut = read_tetrahedra(&text.as_bytes()[..length]);
+            assert!(cut.is_none(), "{format} after {length} bytes");
+        }
+    }
+}
+
+#[test]
+fn claim_of_four_billion_nodes_or_tetrahedra_is_refused_unallocated() {
+    let start = Instant::now();
+    for claim in ["4000000000", "18446744073709551615", "99999999999999999999"] {
+        for (format, text) in cube_of_tets().formats() {
+            for section in ["NOD", "Nodes", "ELM", "Elements"] {
+                let head = format!("${section}\n");
+                let Some(at) = text.find(&head).map(|at| at + head.len()) else {
+                    continue;
+                };
+                let line = text[at..].lines().next().expect("a section has a line");
+                // Each number of the line is a count or a bound.
+                for k in 0..line.split(' ').count() {
+                    let words: Vec<&str> = (line.split(' ').enumerate())
+                        .map(|(word, text)| if word == k { claim } else { text })
+                        .collect();
+                    let huge = format!(
+                        "{}{}{}",
+                        &text[..at],
+                        words.join(" "),
+                        &text[at + line.len()..]
+                    );
+                    let is_count = format != "Gmsh 4.1" || k < 2;
+                    assert_eq!(read_tetrahedra(huge.as_bytes()).is_none(), is_count);
+                }
+            }
+        }
+    }
+    assert!(start.elapsed() < Duration::from_secs(20), "no hang");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    /// Bytes changed, cut out or doubled anywhere end in a sound mesh or in a refusal.
+    #[test]
+    fn damaged_tetrahedra_neither_panic_nor_pass_unsound(
+        format in 0_usize..3,
+        damages in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0_u8..5), 1..6),
+    ) {
+        let mut bytes = cube_of_tets().formats()[format].1.clone().into_bytes();
+        for (at, byte, kind) in damages {
+            let at = at.index(bytes.len());
+            match kind {
+                0 => bytes[at] = byte,
+                1 => { bytes.remove(at); }
+                2 => bytes.insert(at, b"0123456789-+.eE$\n "[byte as usize % 18]),
+                3 => bytes[at] = b'0' + byte % 10,
+                _ => {
+                    let end = (at + byte as usize).min(bytes.len());
+                    let doubled = bytes[at..end].to_vec();
+                    bytes.splice(at..at, doubled);
+                }
+            }
+        }
+        read_tetrahedra(&bytes);
+    }
+
+    #[test]
+    fn random_words_are_no_tetrahedra(words in prop::collection::vec(0_usize..16, 0..80)) {
+        const WORDS: [&str; 16] = [
+            "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", "$Nodes\n", "$EndNodes\n", "$Elements\n",
+            "$EndElements\n", "1 ", "2 ", "4 ", "5 ", "0 ", "\n", "3 ", "-1 ", "1e39 ",
+            "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n", "8 ",
+        ];
+        let text: String = words.iter().map(|&word| WORDS[word]).collect();
+        read_tetrahedra(text.as_bytes());
+    }
+}
+
+#[test]
+fn a_folder_or_an_endless_file_is_no_mesh_of_tetrahedra() {
+    let folder = Folder::new();
+    assert!(read_tets(&folder.0).is_err());
+    assert!(read_tets(Path::new("/dev/zero")).is_err());
+    assert!(read_tets(&folder.0.join("missing.msh")).is_err());
 }

@@ -15,6 +15,8 @@ const FILES: &[(&str, &[u8])] = bundle![
     "organs/heart.glb",
     "organs/kidney.glb",
     "organs/spleen.glb",
+    "tets/beam.msh",
+    "tets/organ.msh",
     "textures/liver-outer.png",
     "textures/liver-normal.png",
     "textures/liver-inner.png",
@@ -41,6 +43,9 @@ const SCENES: &[(&str, &str)] = &[
     ("kidney", include_str!("../../scenes/kidney.toml")),
     ("spleen", include_str!("../../scenes/spleen.toml")),
     ("slab", include_str!("../../scenes/slab.toml")),
+    ("beam", include_str!("../../scenes/beam.toml")),
+    ("organ-tets", include_str!("../../scenes/organ-tets.toml")),
+    ("hanging-bar", include_str!("../../scenes/hanging-bar.toml")),
 ];
 
 /// The scene of a window that was told none.
@@ -64,7 +69,8 @@ pub fn is_bundled(path: &Path) -> bool {
     bundled(path).is_some()
 }
 
-fn bundled(path: &Path) -> Option<&'static [u8]> {
+/// The bytes of a file inside the binary.
+pub fn bundled(path: &Path) -> Option<&'static [u8]> {
     let name = path.to_str()?;
     FILES
         .iter()

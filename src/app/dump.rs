@@ -93,6 +93,7 @@ fn description(session: &Session, renderer: &Renderer, fitted: bool) -> serde_js
     let view = View {
         eye: orbit.eye(),
         target: orbit.target,
+        up: orbit.up,
         fov_y: orbit.fov_y,
     };
     let [width, height] = renderer.size();

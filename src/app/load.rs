@@ -4,8 +4,9 @@ use super::{AppError, assets};
 use crate::geom::import::{self, ImportOptions, UvState};
 use crate::geom::lattice::{self, Lattice};
 use crate::geom::paint::{TissueMaps, paint};
+use crate::geom::tet::{lumped_masses_kg, skin};
 use crate::geom::unwrap::unwrap;
-use crate::geom::{SurfaceMesh, bounds};
+use crate::geom::{Embedding, SurfaceMesh, TetMesh, bounds};
 use crate::scene::{BodySection, MapFiles, RestBox, Scene, SceneSource, Shape};
 use crate::sim::BodySetup;
 use glam::Vec3;
@@ -61,6 +62,25 @@ pub fn scene(name: &str, sets: &[String]) -> Result<Scene, AppError> {
     Ok(Scene::read(&source, sets)?)
 }
 
+/// What is simulated of a body, before it is known where it is held.
+struct Tissue {
+    tets: TetMesh,
+    masses_kg: Vec<f32>,
+    fill: Vec<f32>,
+    embedding: Embedding,
+}
+
+impl From<Lattice> for Tissue {
+    fn from(lattice: Lattice) -> Self {
+        Self {
+            tets: lattice.tets,
+            masses_kg: lattice.masses_kg,
+            fill: lattice.fill,
+            embedding: lattice.embedding,
+        }
+    }
+}
+
 /// Reads or makes the body of `scene`.
 ///
 /// # Errors
@@ -69,28 +89,32 @@ pub fn scene(name: &str, sets: &[String]) -> Result<Scene, AppError> {
 pub fn body(scene: &Scene) -> Result<LoadedBody, AppError> {
     let section = &scene.body;
     let mut notes = Vec::new();
-    let (mesh, lattice) = match (&section.file, section.shape) {
+    let (mesh, tissue) = match (&section.file, section.shape) {
+        (Some(file), _) if section.names_tets() => tets(section, file, &mut notes)?,
         (Some(file), _) => {
             let mesh = surface(section, file, &mut notes)?;
             let lattice = fill(section, &mesh, &mut notes)?;
-            (mesh, lattice)
+            (mesh, lattice.into())
         }
         (None, Some(Shape::Sphere)) => {
             let diameter_m = extent(section).x;
             let (points, triangles) = lattice::sphere(0.5 * diameter_m);
             let mesh = unwrap(&points, &triangles);
             let lattice = fill(section, &mesh, &mut notes)?;
-            (mesh, lattice)
+            (mesh, lattice.into())
         }
-        (None, _) => lattice::block(
-            extent(section),
-            cell_or_guess(section, extent(section).element_product()),
-            section.density_kg_m3,
-        )?,
+        (None, _) => {
+            let (mesh, lattice) = lattice::block(
+                extent(section),
+                cell_or_guess(section, extent(section).element_product()),
+                section.density_kg_m3,
+            )?;
+            (mesh, lattice.into())
+        }
     };
     let (low, high) = bounds(&mesh.points);
     let rest = RestBox { low, high };
-    let fixed: Vec<bool> = lattice
+    let fixed: Vec<bool> = tissue
         .tets
         .particles
         .iter()
@@ -103,11 +127,11 @@ pub fn body(scene: &Scene) -> Result<LoadedBody, AppError> {
         ));
     }
     let setup = BodySetup {
-        tets: lattice.tets,
-        masses_kg: lattice.masses_kg,
+        tets: tissue.tets,
+        masses_kg: tissue.masses_kg,
         fixed,
-        fill: lattice.fill,
-        embedding: lattice.embedding,
+        fill: tissue.fill,
+        embedding: tissue.embedding,
         triangles: mesh.point_triangles(),
         gravity_m_s2: section.gravity_m_s2,
         damping_per_s: section.damping_per_s,
@@ -176,6 +200,67 @@ fn picture(path: &Path) -> Result<RgbaImage, AppError> {
         .to_rgba8())
 }
 
+/// The tetrahedra of `file`, scaled, with their own skin as surface.
+///
+/// Particles are the nodes in the order of the file; every point of the surface is one of them.
+fn tets(
+    section: &BodySection,
+    file: &Path,
+    notes: &mut Vec<String>,
+) -> Result<(SurfaceMesh, Tissue), AppError> {
+    let imported = match assets::bundled(file) {
+        Some(bytes) => import::read_tets_bytes(file, bytes)?,
+        None => import::read_tets(file)?,
+    };
+    notes.extend(imported.notes);
+    let mut tets = imported.mesh;
+    let (low, high) = bounds(&tets.particles);
+    let scale = scale(section, (high - low).max_element(), notes);
+    for particle in &mut tets.particles {
+        *particle *= scale;
+    }
+    let masses_kg = lumped_masses_kg(&tets, section.density_kg_m3);
+    if !masses_kg.iter().all(|mass| mass.is_normal()) {
+        return Err(AppError::Body(format!(
+            "{}: a tetrahedron is too small or too large to weigh anything as a number: the body is \
+             {} m long, so say body.size_m, or mesh it more evenly",
+            file.display(),
+            scale * (high - low).max_element()
+        )));
+    }
+    let skin = skin(&tets);
+    let points: Vec<Vec3> = (skin.particles.iter())
+        .map(|&particle| tets.particles[particle as usize])
+        .collect();
+    let tissue = Tissue {
+        masses_kg,
+        fill: vec![1.0; tets.tets.len()],
+        embedding: Embedding {
+            particles: skin
+                .particles
+                .iter()
+                .map(|&particle| [particle; 4])
+                .collect(),
+            weights: vec![[1.0, 0.0, 0.0, 0.0]; points.len()],
+        },
+        tets,
+    };
+    Ok((unwrap(&points, &skin.triangles), tissue))
+}
+
+/// What makes a body that is `longest_m` long in its file as long as its section says.
+fn scale(section: &BodySection, longest_m: f32, notes: &mut Vec<String>) -> f32 {
+    if let Some(size_m) = section.size_m {
+        return size_m / longest_m;
+    }
+    if !(1e-3..=2.0).contains(&longest_m) {
+        notes.push(format!(
+            "the body is {longest_m} m long if the unit of its file is the metre: say body.size_m"
+        ));
+    }
+    1.0
+}
+
 /// The surface of `file`, scaled, welded, closed, with a usable UV map.
 fn surface(
     section: &BodySection,
@@ -207,17 +292,9 @@ fn surface(
             file.display()
         )));
     }
-    match section.size_m {
-        Some(size_m) => {
-            let scale = size_m / longest_m;
-            for point in &mut mesh.points {
-                *point *= scale;
-            }
-        }
-        None if !(1e-3..=2.0).contains(&longest_m) => notes.push(format!(
-            "the surface is {longest_m} m long if its unit is the metre: say body.size_m"
-        )),
-        None => {}
+    let scale = scale(section, longest_m, notes);
+    for point in &mut mesh.points {
+        *point *= scale;
     }
     Ok(mesh)
 }

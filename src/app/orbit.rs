@@ -1,6 +1,6 @@
 //! The window's camera: it orbits a place, and turns a cursor into a ray.
 
-use glam::{Vec2, Vec3};
+use glam::{Quat, Vec2, Vec3};
 
 /// A half-line in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +18,9 @@ pub struct Orbit {
     pub target: Vec3,
     /// Distance to it [m].
     pub distance_m: f32,
-    /// Angle about the vertical; 0 looks along −z [rad].
+    /// Unit vector upwards.
+    pub up: Vec3,
+    /// Angle about the vertical; 0 looks along −z where y is up [rad].
     pub yaw: f32,
     /// Angle above the horizon [rad].
     pub pitch: f32,
@@ -27,13 +29,15 @@ pub struct Orbit {
 }
 
 impl Orbit {
-    /// The orbit of a camera at `eye` that looks at `target`.
-    pub fn new(eye: Vec3, target: Vec3, fov_y: f32) -> Self {
-        let back = eye - target;
+    /// The orbit of a camera at `eye` that looks at `target`, with `up` upwards in the picture.
+    pub fn new(eye: Vec3, target: Vec3, up: Vec3, fov_y: f32) -> Self {
+        let up = up.normalize_or(Vec3::Y);
+        let back = Quat::from_rotation_arc(up, Vec3::Y) * (eye - target);
         let distance_m = back.length();
         Self {
             target,
             distance_m,
+            up,
             yaw: back.x.atan2(back.z),
             pitch: (back.y / distance_m).clamp(-1.0, 1.0).asin(),
             fov_y,
@@ -44,8 +48,8 @@ impl Orbit {
     pub fn eye(&self) -> Vec3 {
         let (sin_yaw, cos_yaw) = self.yaw.sin_cos();
         let (sin_pitch, cos_pitch) = self.pitch.sin_cos();
-        self.target
-            + self.distance_m * Vec3::new(cos_pitch * sin_yaw, sin_pitch, cos_pitch * cos_yaw)
+        let back = Vec3::new(cos_pitch * sin_yaw, sin_pitch, cos_pitch * cos_yaw);
+        self.target + self.distance_m * (Quat::from_rotation_arc(Vec3::Y, self.up) * back)
     }
 
     /// Turns by a mouse movement in shares of the window's height.
@@ -58,7 +62,7 @@ impl Orbit {
     /// Moves the target sideways by a mouse movement in shares of the window's height.
     pub fn pan(&mut self, by: Vec2) {
         let forward = (self.target - self.eye()).normalize_or(Vec3::NEG_Z);
-        let right = forward.cross(Vec3::Y).normalize_or(Vec3::X);
+        let right = forward.cross(self.up).normalize_or(Vec3::X);
         let up = right.cross(forward);
         let metres = 2.0 * self.distance_m * (0.5 * self.fov_y).tan();
         self.target += metres * (up * by.y - right * by.x);
@@ -83,7 +87,7 @@ impl Orbit {
     pub fn ray(&self, at: Vec2, aspect: f32) -> Ray {
         let eye = self.eye();
         let world_from_view =
-            glam::camera::rh::view::look_at_mat4(eye, self.target, Vec3::Y).inverse();
+            glam::camera::rh::view::look_at_mat4(eye, self.target, self.up).inverse();
         let half_height = (0.5 * self.fov_y).tan();
         let in_view = Vec3::new(
             (2.0 * at.x - 1.0) * half_height * aspect,
@@ -104,12 +108,27 @@ mod tests {
     use super::*;
 
     fn orbit() -> Orbit {
-        Orbit::new(Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.0, 0.5, 0.0), 0.6)
+        orbit_with(Vec3::Y)
+    }
+
+    fn orbit_with(up: Vec3) -> Orbit {
+        Orbit::new(Vec3::new(1.0, 2.0, 3.0), Vec3::new(0.0, 0.5, 0.0), up, 0.6)
     }
 
     #[test]
     fn an_orbit_is_where_it_was_made() {
-        assert!((orbit().eye() - Vec3::new(1.0, 2.0, 3.0)).length() < 1e-5);
+        for up in [Vec3::Y, Vec3::Z, Vec3::NEG_Y, Vec3::new(2.0, 1.0, -1.0)] {
+            let eye = orbit_with(up).eye();
+            assert!((eye - Vec3::new(1.0, 2.0, 3.0)).length() < 1e-5, "{up}");
+        }
+    }
+
+    #[test]
+    fn tilting_the_mouse_goes_towards_what_is_up() {
+        let mut orbit = orbit_with(Vec3::Z);
+        let before = orbit.eye();
+        orbit.turn(Vec2::new(0.0, 0.05));
+        assert!(orbit.eye().z > before.z + 0.1);
     }
 
     #[test]

@@ -107,7 +107,8 @@ impl Renderer {
         let camera = &session.scene.camera;
         let (eye, target) = camera.eye_and_target(&session.rest);
         let [width, height] = self.size();
-        Orbit::new(eye, target, camera.fov_y_deg.to_radians()).fitted(width as f32 / height as f32)
+        Orbit::new(eye, target, camera.up, camera.fov_y_deg.to_radians())
+            .fitted(width as f32 / height as f32)
     }
 
     /// Draws one frame and waits for it.
@@ -126,6 +127,7 @@ impl Renderer {
         let view = View {
             eye: orbit.eye(),
             target: orbit.target,
+            up: orbit.up,
             fov_y: orbit.fov_y,
         };
         self.passes.record(

@@ -8,7 +8,7 @@ use crate::geom::ray::nearest_point;
 use crate::passes::tools::DrawnTool;
 use crate::scene::{MarkerSection, RestBox, Scene};
 use crate::sim::{Method, Simulation, StepReport, ToolAction, ToolInput, ToolShape};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use sha2::{Digest, Sha256};
 use std::time::Instant;
 
@@ -164,6 +164,11 @@ impl Session {
         self.simulation.points()
     }
 
+    /// The body in time.
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
     /// Number of tetrahedra.
     pub fn tet_count(&self) -> usize {
         self.simulation.tet_count()
@@ -256,6 +261,10 @@ impl Marker {
     }
 }
 
+/// Summed in f64: a settled tip is compared to a ten-thousandth of its way.
 fn mean(indices: &[u32], points: &[Vec3]) -> Vec3 {
-    indices.iter().map(|&i| points[i as usize]).sum::<Vec3>() / indices.len() as f32
+    let sum: DVec3 = (indices.iter())
+        .map(|&i| points[i as usize].as_dvec3())
+        .sum();
+    (sum / indices.len() as f64).as_vec3()
 }

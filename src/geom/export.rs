@@ -1,4 +1,8 @@
-//! Surfaces as GLB files: the bytes depend on the surface and the material alone.
+//! Surfaces as GLB files: the bytes depend on the surface and the material alone. Tetrahedra as Gmsh files.
+
+mod gmsh;
+
+pub use gmsh::msh_bytes;
 
 use super::{SurfaceMesh, bounds};
 use glam::Vec3;

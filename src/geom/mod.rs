@@ -12,7 +12,9 @@ pub mod paint;
 pub mod patch;
 pub mod plane;
 pub mod ray;
+pub mod specimen;
 pub mod tangent;
+pub mod tet;
 pub mod unwrap;
 
 #[cfg(test)]

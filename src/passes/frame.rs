@@ -188,6 +188,7 @@ impl FramePasses {
         let view = View {
             eye: Vec3::Z,
             target: Vec3::ZERO,
+            up: Vec3::Y,
             fov_y: 1.0,
         };
         let frame = uniform(

@@ -14,6 +14,8 @@ pub struct View {
     pub eye: Vec3,
     /// What it looks at [m].
     pub target: Vec3,
+    /// What is upwards in the picture.
+    pub up: Vec3,
     /// Vertical view angle [rad].
     pub fov_y: f32,
 }
@@ -22,10 +24,11 @@ impl View {
     /// World to view space: x right, y up, the camera looks along −z.
     pub fn view_from_world(&self) -> Mat4 {
         let forward = (self.target - self.eye).normalize_or(Vec3::NEG_Z);
-        let up = if forward.y.abs() > 0.999 {
-            Vec3::Z
+        let up = self.up.normalize_or(Vec3::Y);
+        let up = if forward.dot(up).abs() > 0.999 {
+            forward.any_orthonormal_vector()
         } else {
-            Vec3::Y
+            up
         };
         glam::camera::rh::view::look_at_mat4(self.eye, self.target, up)
     }
@@ -244,10 +247,27 @@ mod tests {
     }
 
     #[test]
+    fn what_is_upwards_is_higher_in_the_picture_even_seen_from_above() {
+        let view = |eye: Vec3, up: Vec3| View {
+            eye,
+            target: Vec3::ZERO,
+            up,
+            fov_y: 0.5,
+        };
+        for up in [Vec3::Y, Vec3::Z, Vec3::new(1.0, 1.0, 0.3)] {
+            let clip = view(Vec3::new(2.0, -3.0, 1.0), up).clip_from_world(1.0);
+            assert!(clip.project_point3(0.1 * up).y > 0.01, "{up}");
+            let above = view(3.0 * up, up).clip_from_world(1.0);
+            assert!(above.project_point3(Vec3::X).is_finite(), "{up}");
+        }
+    }
+
+    #[test]
     fn the_target_is_in_the_middle_of_the_picture() {
         let view = View {
             eye: Vec3::new(0.3, 0.4, 1.0),
             target: Vec3::new(0.1, 0.0, 0.0),
+            up: Vec3::Y,
             fov_y: 0.5,
         };
         let clip = view.clip_from_world(4.0 / 3.0).project_point3(view.target);

@@ -7,11 +7,11 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// A surface in a lattice, or a shape by formula.
+/// A surface in a lattice, tetrahedra from a file, or a shape by formula.
 #[derive(Clone, Debug, Deserialize, Serialize, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct BodySection {
-    /// A closed surface: glTF, GLB or OBJ. A bundled one, or a path.
+    /// A closed surface (glTF, GLB or OBJ), or tetrahedra (Gmsh's `.msh`). A bundled file, or a path.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
     /// Instead of a file, a shape by formula.
@@ -23,10 +23,11 @@ pub struct BodySection {
     /// Only the meshes of the file whose name contains one of these.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub meshes: Option<Vec<String>>,
-    /// Longest extent of the file's surface [m]; left out, the file's units are metres.
+    /// Longest extent of the file's body [m]; left out, the file's units are metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size_m: Option<f32>,
     /// Edge of a lattice cell [m]; left out, it follows from the volume and a budget of tetrahedra.
+    /// Not for tetrahedra from a file, which are the cells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cell_m: Option<f32>,
     /// Mass a volume.
@@ -198,7 +199,37 @@ impl BodySection {
         }
     }
 
+    /// Whether the file holds tetrahedra, by its ending.
+    pub fn names_tets(&self) -> bool {
+        let ending = self.file.as_ref().and_then(|file| file.extension());
+        ending.is_some_and(|ending| ending.eq_ignore_ascii_case("msh"))
+    }
+
+    /// Refuses what only a surface has.
+    fn check_tets(&self, c: &mut Checker) {
+        if self.cell_m.is_some() {
+            c.problem(
+                "body.cell_m",
+                "a lattice is made round a surface; the tetrahedra of a .msh file are taken as they \
+                 are, so leave it out",
+            );
+        }
+        if self.meshes.is_some() {
+            c.problem("body.meshes", "a .msh file is taken whole, so leave it out");
+        }
+        if self.maps.is_some() {
+            c.problem(
+                "body.maps",
+                "a .msh file has no texture coordinates that maps could be made for: leave them \
+                 out, and the body is painted as body.tissue",
+            );
+        }
+    }
+
     pub(super) fn check(&self, c: &mut Checker) {
+        if self.names_tets() {
+            self.check_tets(c);
+        }
         c.exactly_one(
             "body",
             &[self.file.is_some(), self.shape.is_some()],

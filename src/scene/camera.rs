@@ -20,6 +20,8 @@ pub struct CameraSection {
     /// picture.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance_share: Option<f32>,
+    /// What is upwards in the picture.
+    pub up: Vec3,
     /// Vertical view angle.
     pub fov_y_deg: f32,
     /// Instead of target and direction: where the camera is [m].
@@ -36,6 +38,7 @@ impl Default for CameraSection {
             target_share: Vec3::splat(0.5),
             direction: Vec3::new(0.1, 0.28, 1.0),
             distance_share: None,
+            up: Vec3::Y,
             fov_y_deg: 30.0,
             eye_m: None,
             target_m: None,
@@ -61,7 +64,10 @@ impl CameraSection {
 
     /// Smallest distance [m] at which every corner of `rest` is inside a 4 : 3 picture, with a margin.
     fn fitting_distance_m(&self, rest: &RestBox, target: Vec3, back: Vec3) -> f32 {
-        let right = Vec3::Y.cross(back).normalize_or(Vec3::X);
+        let right = self
+            .up
+            .cross(back)
+            .normalize_or(back.any_orthonormal_vector());
         let up = back.cross(right);
         let half_height = (0.5 * self.fov_y_deg.to_radians()).tan();
         let size = rest.high - rest.low;
@@ -88,6 +94,10 @@ impl CameraSection {
         c.range3("camera.direction", self.direction, -1e6, 1e6);
         if self.direction.length() < 1e-6 {
             c.problem("camera.direction", "it must not be zero");
+        }
+        c.range3("camera.up", self.up, -1e6, 1e6);
+        if self.up.length() < 1e-6 {
+            c.problem("camera.up", "it must not be zero");
         }
         if self.eye_m.is_some() != self.target_m.is_some() {
             c.problem("camera", "eye_m and target_m go together");

@@ -28,6 +28,11 @@ pub(super) fn apply(name: &str, scene: Scene, sets: &[String]) -> Result<Scene, 
             if scene.body.file != before {
                 scene.body.maps = None;
             }
+            // Nor are cells and names of a surface said of tetrahedra.
+            if scene.body.names_tets() {
+                scene.body.cell_m = None;
+                scene.body.meshes = None;
+            }
             scene.body.file = scene.body.file.map(|file| from_here(&file));
         }
         if path == "body.shape" {

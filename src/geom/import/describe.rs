@@ -4,13 +4,19 @@ use super::error::ImportError;
 use super::part::{TextureSource, read_parts};
 use super::picture::read_picture;
 use super::surface::{ImportOptions, read_surface};
+use super::tets::{ImportedTets, read_tets};
+use crate::geom::bounds;
+use crate::geom::tet::{self, SLIVER_BELOW};
 use std::fmt::Write;
 use std::path::Path;
 
 /// Extents outside this are hardly an organ in metres.
 const PLAUSIBLE_EXTENT_M: std::ops::RangeInclusive<f32> = 0.005..=1.0;
 
-/// Says what a surface (`.glb`, `.gltf`, `.obj`) or picture (`.png`, `.jpg`) holds, a line a fact.
+const TO_STRING: &str = "a string takes all that is written to it";
+
+/// Says what a surface (`.glb`, `.gltf`, `.obj`), a body of tetrahedra (`.msh`) or a picture (`.png`,
+/// `.jpg`) holds, a line a fact.
 ///
 /// # Errors
 ///
@@ -22,12 +28,73 @@ pub fn describe(path: &Path) -> Result<String, ImportError> {
             let picture = read_picture(&TextureSource::File(path.to_owned()))?;
             Ok(format!("picture: {}", about(&picture)))
         }
+        Some("msh") => Ok(describe_tets(&read_tets(path)?)),
         _ => describe_surface(path),
     }
 }
 
+fn describe_tets(imported: &ImportedTets) -> String {
+    let mesh = &imported.mesh;
+    let (low, high) = bounds(&mesh.particles);
+    let extent = high - low;
+    let volume_m3: f64 = (0..mesh.tets.len())
+        .map(|tet| tet::volume_m3(tet::corners(mesh, tet)))
+        .sum();
+    let skin = tet::skin(mesh);
+    let quality = imported.quality;
+    let mut text = String::new();
+    writeln!(
+        text,
+        "format: {}\n\
+         tetrahedra: {} on {} nodes, {} part(s)\n\
+         extent: {} x {} x {} m, volume {volume_m3:.6e} m³ ({:.1} mL)\n\
+         quality: radius ratio 3r/R {:.3} in the median, {:.3e} at worst; {} slivers below \
+         {SLIVER_BELOW}\n\
+         boundary: {} vertices, {} triangles, Euler number {}",
+        imported.format,
+        mesh.tets.len(),
+        mesh.particles.len(),
+        imported.parts,
+        extent.x,
+        extent.y,
+        extent.z,
+        volume_m3 * 1e6,
+        quality.median,
+        quality.worst,
+        quality.slivers,
+        skin.particles.len(),
+        skin.triangles.len(),
+        skin.euler_number(),
+    )
+    .expect(TO_STRING);
+    if imported.ignored > 0 {
+        writeln!(
+            text,
+            "passed over: {} points, lines and faces",
+            imported.ignored
+        )
+        .expect(TO_STRING);
+    }
+    warn_of_size(&mut text, extent.max_element());
+    for note in &imported.notes {
+        writeln!(text, "note: {note}").expect(TO_STRING);
+    }
+    text.trim_end().to_owned()
+}
+
+/// Says that a body of this length [m] is hardly an organ in metres.
+fn warn_of_size(text: &mut String, longest_m: f32) {
+    if !PLAUSIBLE_EXTENT_M.contains(&longest_m) {
+        writeln!(
+            text,
+            "warning: {longest_m:.4} m is not the size of an organ; set body.size_m to the longest \
+             extent wanted"
+        )
+        .expect(TO_STRING);
+    }
+}
+
 fn describe_surface(path: &Path) -> Result<String, ImportError> {
-    const TO_STRING: &str = "a string takes all that is written to it";
     let mut text = String::new();
     let file = read_parts(path)?;
     for part in &file.parts {
@@ -67,15 +134,7 @@ fn describe_surface(path: &Path) -> Result<String, ImportError> {
         surface.uv,
     )
     .expect(TO_STRING);
-    if !PLAUSIBLE_EXTENT_M.contains(&extent.max_element()) {
-        writeln!(
-            text,
-            "warning: {:.4} m is not the size of an organ; set body.size_m to the longest extent \
-             wanted",
-            extent.max_element()
-        )
-        .expect(TO_STRING);
-    }
+    warn_of_size(&mut text, extent.max_element());
     for note in &surface.notes {
         writeln!(text, "note: {note}").expect(TO_STRING);
     }

@@ -1,10 +1,10 @@
-//! Why a surface could not be read, in words that name the file, the place in it and the remedy.
+//! Why a mesh could not be read, in words that name the file, the place in it and the remedy.
 
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why `file` gave no surface.
+/// Why `file` gave no mesh.
 #[derive(Debug)]
 pub struct ImportError {
     /// The file that was asked for.
@@ -13,7 +13,7 @@ pub struct ImportError {
     pub fault: ImportFault,
 }
 
-/// What can be wrong with a surface file.
+/// What can be wrong with a mesh file.
 #[derive(Debug)]
 pub enum ImportFault {
     /// The file, or a file beside it that it names, cannot be read.
@@ -46,6 +46,18 @@ pub enum ImportFault {
     },
     /// There is no triangle to use.
     NoTriangles,
+    /// There is no tetrahedron to use.
+    NoTetrahedra,
+    /// Every tetrahedron is flat.
+    FlatTetrahedra {
+        /// How many there are.
+        count: usize,
+    },
+    /// Tetrahedra fill some space more than once, whichever way they are turned.
+    Overlap {
+        /// Which ones, and how.
+        problem: String,
+    },
     /// A mesh that was asked for by name is not in the file.
     NoSuchMesh {
         /// The name asked for.
@@ -102,7 +114,8 @@ impl fmt::Display for ImportFault {
             ),
             Self::Ending => write!(
                 f,
-                "not a kind of file that is read as a surface; use .glb, .gltf or .obj"
+                "not a kind of file that is read as a surface; use .glb, .gltf or .obj, or .msh for \
+                 tetrahedra"
             ),
             Self::TooLarge { what } => {
                 write!(f, "{what}; simplify the mesh in a modelling program first")
@@ -117,6 +130,17 @@ impl fmt::Display for ImportFault {
                 f,
                 "holds no mesh with triangles; export the surface as triangles"
             ),
+            Self::NoTetrahedra => write!(
+                f,
+                "holds neither tetrahedra nor hexahedra; mesh the volume, not its surface alone"
+            ),
+            Self::FlatTetrahedra { count } => write!(
+                f,
+                "all {count} tetrahedra are flat, so they hold no tissue; check the coordinates"
+            ),
+            Self::Overlap { problem } => {
+                write!(f, "the tetrahedra overlap: {problem}; mesh the volume anew")
+            }
             Self::NoSuchMesh { wanted, known } => {
                 write!(f, "no mesh has `{wanted}` in its name; there are: ")?;
                 write!(f, "{}", known.join(", "))

@@ -9,9 +9,9 @@ use std::path::{Path, PathBuf};
 const FILE_BYTES_MAX: u64 = 1 << 28;
 /// Vertices and triangles beyond this are refused: a node may repeat a mesh, so the size of the
 /// file is no bound by itself.
-const ELEMENTS_MAX: usize = 1 << 24;
+pub(super) const ELEMENTS_MAX: usize = 1 << 24;
 /// Coordinates beyond this [m] leave f32 without room for products of three.
-const COORDINATE_MAX: f32 = 1e9;
+pub(super) const COORDINATE_MAX: f32 = 1e9;
 
 /// One mesh of a file, placed where the file's transforms put it.
 #[derive(Clone, Debug, Default)]
