@@ -1,98 +1,50 @@
-//! Rigid spheres and capsules against surface points: swept, one-sided, with friction.
+//! One rigid tool against the surface of the body: swept, one-sided, with friction.
 //!
-//! A point is looked at in the frame of the tool, where the tool stands still and the point moves
-//! along a segment in a substep. If that segment reaches the tool, the tangent plane where it first
-//! does so holds the point back for the rest of the substep, however fast the tool is. The
-//! multiplier of that constraint, over h², is the force.
+//! Everything is looked at in the frame of the tool, where the tool stands still and the triangles
+//! of the surface move. Of each triangle the place that is nearest to the tool's axis is kept out of
+//! the tool; a triangle that goes far in a substep is swept, and held where it first comes to the
+//! tool ([`sweep`]). Such a [`Touch`] is an inequality with a multiplier that is never negative and
+//! Coulomb friction. Multiplier over h² is force.
+//!
+//! Two kinds of solver use it. One that alternates calls [`Contacts::solve`] after its own sweep. One
+//! that solves for all positions at once calls [`Contacts::look`] at its guess of them, reads
+//! [`Contacts::active`], and hands the multipliers that it found to [`Contacts::set_multipliers`];
+//! `Tools` offers the same for all tools together.
 
-use super::{ToolShape, particles::Handle};
+mod inside;
+mod near;
+mod nearest;
+mod sweep;
+mod touch;
+
+pub use inside::is_inside;
+pub use near::{Surface, SweptBox};
+
+use super::{ToolShape, handle::Handle};
 use glam::{Vec3, Vec4};
+use near::{Near, Vicinity};
+use nearest::{Axis, Nearest, blend, nearest};
+use sweep::sweep;
+use touch::Touch;
 
-/// A point found inside the tool leaves it no faster than this [m/s]: a tool that appears inside
+/// A place found inside the tool leaves it no faster than this [m/s]: a tool that appears inside
 /// the body must not fling it away.
 const DEPENETRATION_SPEED_M_S: f32 = 0.5;
-/// Sweeps over the contacts each time the elastic constraints have been swept once: neighbouring
-/// points share particles.
-const CONTACT_SWEEPS: usize = 3;
-
-/// Where a point touches a tool, in the frame of the tool.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hit {
-    /// From the axis towards the point, of length 1.
-    pub normal: Vec3,
-    /// The nearest place on the axis [m].
-    pub foot: Vec3,
-    /// How far the point was outside the tool at the start [m], negative inside.
-    pub start_gap_m: f32,
-}
-
-/// Whether a point that moves from `start` to `end` in the frame of a tool comes to it, and where
-/// it first does.
-///
-/// The distance to an axis is a convex function of the way, so Newton's method from the start never
-/// oversteps the first contact.
-pub fn sweep(shape: ToolShape, start: Vec3, end: Vec3) -> Option<Hit> {
-    let (axis, radius) = (shape.axis_m(), shape.radius_m());
-    let way = end - start;
-    let nearest = |share: f32| {
-        let at = start + share * way;
-        let along = at.dot(axis) / axis.length_squared().max(f32::MIN_POSITIVE);
-        let foot = along.clamp(0.0, 1.0) * axis;
-        (foot, at - foot)
-    };
-    let (_, offset) = nearest(0.0);
-    let start_gap_m = offset.length() - radius;
-    let mut share = 0.0_f32;
-    // Convex and piecewise smooth: six steps reach a thousandth of the radius.
-    for _ in 0..12 {
-        let (foot, offset) = nearest(share);
-        let distance = offset.length();
-        // A point on the axis itself has no side; it leaves against its motion, or upwards.
-        let normal = offset
-            .try_normalize()
-            .or((-way).try_normalize())
-            .unwrap_or(Vec3::Y);
-        let gap = distance - radius;
-        if gap <= 1e-3 * radius {
-            return Some(Hit {
-                normal,
-                foot,
-                start_gap_m,
-            });
-        }
-        let closing = -normal.dot(way);
-        if closing <= 0.0 {
-            return None;
-        }
-        share += gap / closing;
-        if share > 1.0 {
-            return None;
-        }
-    }
-    None
-}
-
-/// A surface point that may touch the tool in this step.
-#[derive(Clone, Debug)]
-pub struct Contact {
-    pub point: u32,
-    handle: Handle,
-    touch: Option<Touch>,
-}
-
-/// A point that touches the tool in this substep.
-#[derive(Clone, Copy, Debug)]
-struct Touch {
-    hit: Hit,
-    /// The point at the start of the substep, in the frame of the tool [m].
-    start: Vec3,
-    /// The gap that is asked for [m]: 0, or less for a point that was deep inside.
-    gap_m: f32,
-    /// Multiplier of the gap, never negative [kg m].
-    normal_multiplier: f32,
-    /// Multiplier of friction, along the tangent plane [kg m].
-    tangent_multiplier: Vec3,
-}
+/// Sweeps over the touches between two looks at the surface, if they do not settle before.
+const SWEEPS_MAX: usize = 12;
+/// Touches have settled when none moves its place by more than this share of the largest move.
+const SETTLED_SHARE: f32 = 0.01;
+/// Looks at the surface in one solve, if it does not settle before.
+const LOOKS_MAX: usize = 8;
+/// The surface is looked at again when a place was moved by more than this share of the radius.
+const LOOK_AGAIN_RADII: f32 = 0.02;
+/// A triangle that moves by less than this share of its distance from the axis cannot have
+/// passed it.
+const PASSING_SHARE: f32 = 0.9;
+/// Within this share of the radius a tool that moves is as good as one that stands still.
+const SLOW_RADII: f32 = 0.1;
+/// A normal that turns by more than this cosine from one substep to the next has changed sides.
+const OTHER_SIDE_COSINE: f32 = -0.2;
 
 /// The tool in a substep.
 #[derive(Clone, Copy, Debug)]
@@ -105,141 +57,405 @@ pub struct Motion {
     pub to_m: Vec3,
 }
 
-impl Contact {
-    /// `point` by its handle, not touching yet.
-    pub fn new(point: u32, handle: Handle) -> Self {
-        Self {
-            point,
-            handle,
-            touch: None,
+/// On which side of the surface the tip of a tool is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Side {
+    /// Not looked at yet.
+    #[default]
+    Unknown,
+    /// Outside: it is kept there.
+    Outside,
+    /// Inside, where it appeared or was forced to: the surface next to it is drawn over it.
+    Inside,
+}
+
+/// A contact as it is seen by a solver that solves for all positions at once.
+#[derive(Clone, Copy, Debug)]
+#[allow(dead_code, reason = "for solvers that find all multipliers at once")]
+pub struct ActiveContact {
+    /// Where on the body.
+    pub handle: Handle,
+    /// From the tool into the body, of length 1.
+    pub normal: Vec3,
+    /// How far the place is outside the tool, less what is asked for [m]: not negative when the
+    /// contact holds. Its gradient with respect to the place is the normal.
+    pub gap_m: f32,
+    /// How far the place has slid along the tool since the start of the substep [m].
+    pub slip_m: Vec3,
+    /// Coulomb friction coefficient.
+    pub friction: f32,
+}
+
+/// What one tool touches.
+#[derive(Clone, Debug, Default)]
+pub struct Contacts {
+    side: Side,
+    vicinity: Vicinity,
+    touches: Vec<Touch>,
+    /// Whether it pressed on the body when the last step began.
+    pressed_before: bool,
+    /// Touches are swept to and fro, so that none is always the last.
+    backwards: bool,
+}
+
+impl Contacts {
+    /// Forgets everything: the tool was lifted.
+    pub fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Forgets on which side of the surface the tool is: the body was put elsewhere.
+    pub fn forget_side(&mut self) {
+        self.side = Side::Unknown;
+    }
+
+    /// Whether the tool pressed on the body in the last substep.
+    pub fn pressed(&self) -> bool {
+        (self.vicinity.near.iter()).any(|near| near.last_multiplier != Vec3::ZERO)
+    }
+
+    /// Whether the tool may touch the body in this step.
+    pub fn is_near(&self) -> bool {
+        !self.vicinity.near.is_empty()
+    }
+
+    /// Number of active contacts.
+    #[allow(dead_code, reason = "for solvers that find all multipliers at once")]
+    pub fn len(&self) -> usize {
+        self.touches.len()
+    }
+
+    /// Finds the triangles that the tool may touch in a step in which it goes from `from_m` on and
+    /// sweeps `swept`. A tool that was known to be outside stays outside.
+    pub fn begin_step(
+        &mut self,
+        shape: ToolShape,
+        from_m: Vec3,
+        swept: SweptBox,
+        surface: Surface,
+        places: &[Vec4],
+    ) {
+        let pressed = self.pressed();
+        let released = std::mem::replace(&mut self.pressed_before, pressed) && !pressed;
+        self.touches.clear();
+        if swept.misses(surface.bounds) {
+            self.vicinity.clear();
+            self.side = Side::Outside;
+            return;
+        }
+        self.vicinity.find(shape, from_m, swept, surface);
+        // What has been let go may have slipped in; what was inside may have come out.
+        if self.side == Side::Inside || released {
+            self.side = Side::Unknown;
+        }
+        if self.side == Side::Unknown {
+            let inside = is_inside(from_m, surface.points, surface.triangles);
+            self.side = if inside { Side::Inside } else { Side::Outside };
+        }
+        if self.side == Side::Inside {
+            self.vicinity.find_way_out(from_m, surface, places);
         }
     }
 
-    /// Forgets the contact of the last substep.
-    pub fn begin_substep(&mut self) {
-        self.touch = None;
+    /// Takes over where the surface is at the start of a substep.
+    pub fn begin_substep(&mut self, from_m: Vec3, previous: &[Vec4]) {
+        self.touches.clear();
+        self.vicinity.begin_substep(from_m, previous);
     }
 
-    /// Force on the body times h² [kg m].
-    pub fn multiplier(&self) -> Vec3 {
-        self.touch.map_or(Vec3::ZERO, |touch| {
-            touch.normal_multiplier * touch.hit.normal + touch.tangent_multiplier
+    /// Remembers what was pushed, to begin with in the next substep.
+    pub fn end_substep(&mut self) {
+        for near in &mut self.vicinity.near {
+            near.last_multiplier = Vec3::ZERO;
+        }
+        for touch in &self.touches {
+            let near = &mut self.vicinity.near[touch.near as usize];
+            near.last_multiplier = touch.multiplier;
+            near.last_normal = touch.normal;
+        }
+    }
+
+    /// Whether the tool would touch a body that stands still, on the way of `tool`.
+    pub fn would_touch(&mut self, tool: Motion, places: &[Vec4]) -> bool {
+        self.begin_substep(tool.from_m, places);
+        self.look(tool, places, f32::MAX, 0.0);
+        let found = !self.touches.is_empty();
+        self.touches.clear();
+        found
+    }
+
+    /// Finds what touches the tool, and pushes it out, with friction.
+    pub fn solve(&mut self, tool: Motion, places: &mut [Vec4], substep_s: f32) {
+        for _ in 0..LOOKS_MAX {
+            self.look(tool, places, substep_s, 0.0);
+            let moved_m = self.push(tool, places);
+            if moved_m <= LOOK_AGAIN_RADII * tool.shape.radius_m() {
+                break;
+            }
+        }
+    }
+
+    /// The contacts that the last look found.
+    #[allow(dead_code, reason = "for solvers that find all multipliers at once")]
+    pub fn active<'a>(
+        &'a self,
+        tool: Motion,
+        places: &'a [Vec4],
+    ) -> impl Iterator<Item = ActiveContact> + 'a {
+        self.touches.iter().map(move |touch| ActiveContact {
+            handle: touch.handle,
+            normal: touch.normal,
+            gap_m: touch.gap_m(tool, places),
+            slip_m: touch.slip_m(tool, places),
+            friction: tool.friction,
         })
     }
-}
 
-/// Finds which of `contacts` touch the tool and pushes them out, with friction.
-pub fn solve(
-    contacts: &mut [Contact],
-    tool: Motion,
-    places: &mut [Vec4],
-    previous: &[Vec4],
-    substep_s: f32,
-) {
-    let mut touching = 0;
-    for contact in contacts.iter_mut() {
-        if contact.touch.is_none() && contact.handle.inverse_mass > 0.0 {
-            let start = contact.handle.place(previous) - tool.from_m;
-            let end = contact.handle.place(places) - tool.to_m;
-            contact.touch = sweep(tool.shape, start, end).map(|hit| Touch {
-                hit,
+    /// Takes over the multiplier of each active contact, force on the body times h² [kg m].
+    ///
+    /// # Panics
+    ///
+    /// If there is not one for each.
+    #[allow(dead_code, reason = "for solvers that find all multipliers at once")]
+    pub fn set_multipliers(&mut self, multipliers: &[Vec3]) {
+        assert_eq!(multipliers.len(), self.touches.len(), "one a contact");
+        for (touch, &multiplier) in self.touches.iter_mut().zip(multipliers) {
+            touch.multiplier = multiplier;
+        }
+    }
+
+    /// Force on the body times h² in this substep [kg m].
+    pub fn multiplier(&self) -> Vec3 {
+        self.touches.iter().map(|touch| touch.multiplier).sum()
+    }
+
+    /// Looks where the surface is now, and brings the touches up to date. Places up to `margin_m`
+    /// away are taken too.
+    pub fn look(&mut self, tool: Motion, places: &[Vec4], substep_s: f32, margin_m: f32) {
+        let radius = tool.shape.radius_m();
+        let leave_m = DEPENETRATION_SPEED_M_S * substep_s;
+        let inside = self.side == Side::Inside;
+        let Vicinity {
+            near,
+            points,
+            carriers,
+            ..
+        } = &mut self.vicinity;
+        for point in points.iter_mut() {
+            point.end = point.place(places) - tool.to_m;
+            point.way_m = point.start.distance(point.end);
+        }
+        for (index, near) in near.iter_mut().enumerate() {
+            let corners = near.corners.map(|k| &points[k as usize]);
+            let way_m = corners
+                .iter()
+                .map(|corner| corner.way_m)
+                .fold(0.0, f32::max);
+            if near.touch.is_none() && near.clear_m > way_m + margin_m {
+                continue;
+            }
+            let start = corners.map(|corner| corner.start);
+            let end = corners.map(|corner| corner.end);
+            let seen = Seen {
+                axis: near.axis(tool.shape),
+                radius_m: radius,
                 start,
-                gap_m: (hit.start_gap_m + DEPENETRATION_SPEED_M_S * substep_s).min(0.0),
-                normal_multiplier: 0.0,
-                tangent_multiplier: Vec3::ZERO,
+                end,
+                way_m,
+                margin_m,
+            };
+            let found = if inside {
+                Some(seen.from_inside())
+            } else {
+                seen.from_outside(near)
+            };
+            let Some(found) = found else { continue };
+            let carriers = near.carriers(carriers, corners);
+            let handle = carriers.at(found.weights, places);
+            if handle.inverse_mass <= 0.0 {
+                continue;
+            }
+            let touch = Touch {
+                near: index as u32,
+                handle,
+                normal: found.normal,
+                foot: found.foot,
+                start: blend(found.weights, start),
+                target_m: (found.start_gap_m + leave_m).min(0.0),
+                multiplier: Vec3::ZERO,
+                guess: near.last_multiplier,
+            };
+            match near.touch {
+                None => {
+                    near.touch = Some(self.touches.len() as u32);
+                    self.touches.push(touch);
+                }
+                // What was pushed stays pushed; from now on it is held here.
+                Some(known) => {
+                    let known = &mut self.touches[known as usize];
+                    *known = Touch {
+                        multiplier: known.multiplier,
+                        guess: Vec3::ZERO,
+                        target_m: known.target_m,
+                        ..touch
+                    };
+                }
+            }
+        }
+    }
+
+    /// Sweeps over the touches until they settle. How far a place was moved at most [m].
+    fn push(&mut self, tool: Motion, places: &mut [Vec4]) -> f32 {
+        let mut scale_m = 0.0_f32;
+        for touch in &mut self.touches {
+            scale_m = scale_m.max(touch.push_guess(tool, places));
+        }
+        let mut moved_m = scale_m;
+        for _ in 0..SWEEPS_MAX {
+            let mut worst_m = 0.0_f32;
+            self.backwards = !self.backwards;
+            if self.backwards {
+                for touch in self.touches.iter_mut().rev() {
+                    worst_m = worst_m.max(touch.solve(tool, places));
+                }
+            } else {
+                for touch in &mut self.touches {
+                    worst_m = worst_m.max(touch.solve(tool, places));
+                }
+            }
+            moved_m += worst_m;
+            scale_m = scale_m.max(worst_m);
+            if worst_m <= SETTLED_SHARE * scale_m || self.touches.len() == 1 {
+                break;
+            }
+        }
+        moved_m
+    }
+
+    /// Deepest that the tool is inside the surface, at the end of a step [m]; 0 or less outside.
+    pub fn penetration_m(&self, shape: ToolShape, position_m: Vec3, points: &[Vec3]) -> f32 {
+        let radius = shape.radius_m();
+        let depth = |near: &Near| {
+            let corners = near.corners.map(|k| {
+                let index = self.vicinity.points[k as usize].point;
+                points[index as usize] - position_m
             });
-        }
-        touching += usize::from(contact.touch.is_some());
-    }
-    let sweeps = if touching > 1 {
-        CONTACT_SWEEPS
-    } else {
-        touching
-    };
-    for _ in 0..sweeps {
-        for contact in contacts.iter_mut() {
-            let handle = contact.handle;
-            if let Some(touch) = &mut contact.touch {
-                touch.solve(handle, tool, places);
+            let found = nearest(near.axis(shape), corners);
+            if self.side == Side::Inside && found.normal(corners).dot(outwards(corners)) > 0.0 {
+                radius + found.distance_m()
+            } else {
+                radius - found.distance_m()
             }
+        };
+        self.vicinity.near.iter().map(depth).fold(0.0, f32::max)
+    }
+}
+
+/// Not of length 1.
+fn outwards([a, b, c]: [Vec3; 3]) -> Vec3 {
+    (b - a).cross(c - a)
+}
+
+/// A triangle that may touch, in the frame of the tool.
+struct Seen {
+    axis: Axis,
+    radius_m: f32,
+    start: [Vec3; 3],
+    end: [Vec3; 3],
+    /// The longest way of a corner [m].
+    way_m: f32,
+    margin_m: f32,
+}
+
+/// Where a triangle is to be held.
+struct Found {
+    normal: Vec3,
+    foot: Vec3,
+    weights: Vec3,
+    /// How far the triangle was outside the tool at the start [m], negative inside.
+    start_gap_m: f32,
+}
+
+impl Seen {
+    /// A triangle that was outside the tool, or nearly so, when the substep started.
+    fn from_outside(&self, near: &mut Near) -> Option<Found> {
+        let slow = self.way_m < PASSING_SHARE * (near.clear_m + self.radius_m);
+        if slow && self.way_m < SLOW_RADII * self.radius_m {
+            let found = nearest(self.axis, self.end);
+            let gap_m = found.distance_m() - self.radius_m;
+            near.clear_m = near.clear_m.max(gap_m - self.way_m);
+            if gap_m >= self.margin_m && near.touch.is_none() {
+                return None;
+            }
+            let (normal, _) = self.on_its_side(&found, self.end, near);
+            let start = blend(found.weights, self.start) - found.foot;
+            return Some(self.found(found, normal, normal.dot(start) - self.radius_m));
+        }
+        let at_start = nearest(self.axis, self.start);
+        let (start_normal, side) = self.on_its_side(&at_start, self.start, near);
+        let start_gap_m = side * at_start.distance_m() - self.radius_m;
+        near.clear_m = start_gap_m;
+        if side < 0.0 {
+            return Some(self.found(at_start, start_normal, start_gap_m));
+        }
+        if self.way_m < PASSING_SHARE * at_start.distance_m() {
+            let found = nearest(self.axis, self.end);
+            if found.distance_m() - self.radius_m >= self.margin_m && near.touch.is_none() {
+                return None;
+            }
+            let normal = found.normal(self.end);
+            return Some(self.found(found, normal, start_gap_m));
+        }
+        let hit = sweep(
+            self.axis,
+            self.radius_m + self.margin_m,
+            self.start,
+            self.end,
+        )?;
+        Some(Found {
+            normal: hit.normal,
+            foot: hit.foot,
+            weights: hit.weights,
+            start_gap_m,
+        })
+    }
+
+    /// The triangle that is to be drawn over a tool inside the body.
+    fn from_inside(&self) -> Found {
+        let tip = [self.axis[0]; 2];
+        let signed = |corners: [Vec3; 3]| {
+            let found = nearest(tip, corners);
+            let direction = found.normal(corners);
+            let side = if direction.dot(outwards(corners)) > 0.0 {
+                -1.0
+            } else {
+                1.0
+            };
+            (found, side * direction, side * found.distance_m())
+        };
+        let (found, normal, _) = signed(self.end);
+        let (_, _, start_m) = signed(self.start);
+        self.found(found, normal, start_m - self.radius_m)
+    }
+
+    /// The normal of the nearest place, and whether the place is on the side of the axis where it
+    /// was in the last substep: 1 if so, −1 if the axis has gone through the face since.
+    fn on_its_side(&self, found: &Nearest, corners: [Vec3; 3], near: &Near) -> (Vec3, f32) {
+        let normal = found.normal(corners);
+        let on_face = found.weights.min_element() > 0.0;
+        if on_face && normal.dot(near.last_normal) < OTHER_SIDE_COSINE {
+            (-normal, -1.0)
+        } else {
+            (normal, 1.0)
         }
     }
-}
 
-impl Touch {
-    fn solve(&mut self, handle: Handle, tool: Motion, places: &mut [Vec4]) {
-        let normal = self.hit.normal;
-        let end = handle.place(places) - tool.to_m;
-        let gap = normal.dot(end - self.hit.foot) - tool.shape.radius_m() - self.gap_m;
-        let pushed = (self.normal_multiplier - gap / handle.inverse_mass).max(0.0);
-        let push = (pushed - self.normal_multiplier) * normal;
-        self.normal_multiplier = pushed;
-
-        // Coulomb: stick if the force of friction allows it. The push leaves the tangent alone.
-        let slip = end - self.start;
-        let slip = slip - normal.dot(slip) * normal;
-        let held = (self.tangent_multiplier - slip / handle.inverse_mass)
-            .clamp_length_max(tool.friction * pushed);
-        let drag = held - self.tangent_multiplier;
-        self.tangent_multiplier = held;
-
-        handle.push(places, push + drag);
-    }
-}
-
-/// How deep `point` is inside the tool at `position` [m]; negative outside.
-pub fn depth_m(shape: ToolShape, position_m: Vec3, point: Vec3) -> f32 {
-    let axis = shape.axis_m();
-    let offset = point - position_m;
-    let along = offset.dot(axis) / axis.length_squared().max(f32::MIN_POSITIVE);
-    shape.radius_m() - (offset - along.clamp(0.0, 1.0) * axis).length()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    const BALL: ToolShape = ToolShape::Sphere { radius_m: 0.01 };
-
-    #[test]
-    fn point_that_passes_through_the_whole_ball_is_stopped_where_it_came_in() {
-        let hit = sweep(BALL, Vec3::X * 0.5, Vec3::X * -0.5).expect("the ball is in the way");
-        assert!((hit.normal - Vec3::X).length() < 1e-6, "{hit:?}");
-    }
-
-    #[test]
-    fn point_that_passes_beside_the_ball_is_not_touched() {
-        let aside = Vec3::Y * 0.0101;
-        assert_eq!(sweep(BALL, Vec3::X + aside, -Vec3::X + aside), None);
-    }
-
-    #[test]
-    fn point_on_the_axis_leaves_to_a_side_that_is_finite() {
-        let hit = sweep(BALL, Vec3::ZERO, Vec3::ZERO).expect("the point is inside");
-        assert_eq!(hit.normal.length(), 1.0);
-    }
-
-    proptest! {
-        #[test]
-        fn sweep_agrees_with_ten_thousand_small_steps(
-            start in prop::array::uniform3(-0.1_f32..0.1),
-            end in prop::array::uniform3(-0.1_f32..0.1),
-            axis in prop::array::uniform3(-0.05_f32..0.05),
-        ) {
-            let shape = ToolShape::Capsule { radius_m: 0.01, axis_m: Vec3::from(axis) };
-            let (start, end) = (Vec3::from(start), Vec3::from(end));
-            let deepest = (0..=10_000)
-                .map(|k| depth_m(shape, Vec3::ZERO, start.lerp(end, k as f32 / 1e4)))
-                .fold(f32::NEG_INFINITY, f32::max);
-            let found = sweep(shape, start, end).is_some();
-            // Contact is declared a thousandth of the radius early; beyond twice that the two
-            // must agree.
-            if deepest > 0.0 {
-                prop_assert!(found, "depth {deepest}");
-            } else if deepest < -2e-5 {
-                prop_assert!(!found, "gap {deepest}");
-            }
+    fn found(&self, nearest: Nearest, normal: Vec3, start_gap_m: f32) -> Found {
+        Found {
+            normal,
+            foot: nearest.foot,
+            weights: nearest.weights,
+            start_gap_m,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! A tool that holds part of the surface.
 
-use super::particles::Handle;
+use super::handle::Handle;
 use crate::geom::Embedding;
 use glam::{Vec3, Vec4};
 use std::collections::BTreeSet;
@@ -82,6 +82,7 @@ impl Grab {
         let carriers: BTreeSet<u32> = holds
             .iter()
             .flat_map(|hold| hold.handle.carriers())
+            .map(|(particle, _)| particle)
             .collect();
         let mass_kg: f32 = carriers
             .into_iter()

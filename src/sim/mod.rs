@@ -9,6 +9,7 @@ pub mod constraint;
 mod contact;
 pub mod diagnose;
 mod grab;
+mod handle;
 mod lanes;
 mod mass_spring;
 mod model;
@@ -226,7 +227,7 @@ pub struct StepReport {
     pub volume_drift: f32,
     /// Force of the body on each tool [N], mean over the step, in the order of the inputs.
     pub tool_forces_n: Vec<Vec3>,
-    /// Deepest surface point inside a pushing tool at the end of the step [m].
+    /// Deepest that a pushing tool is inside the surface, faces and all, at the end of the step [m].
     pub penetration_max_m: f32,
     /// Tetrahedra of negative volume that were positive at rest.
     pub inverted_tets: usize,
@@ -234,6 +235,7 @@ pub struct StepReport {
     pub frozen_particles: usize,
     /// Fastest particle at the end of the step [m/s].
     pub speed_max_m_s: f32,
-    /// Nothing moved and nothing was computed.
+    /// Nothing moved and nothing was computed; forces are those of a tool that rests on the body or
+    /// holds it, as they were when it fell asleep.
     pub asleep: bool,
 }

@@ -1,7 +1,6 @@
-//! The state of the particles, and handles by which a place between them is moved.
+//! The state of the particles.
 
 use super::team::{SharedSlice, Team};
-use crate::geom::Embedding;
 use glam::{Vec3, Vec4};
 
 /// Positions, velocities and inverse masses of a body.
@@ -101,51 +100,5 @@ impl Particles {
             .map(|v| v.length_squared())
             .fold(0.0, f32::max)
             .sqrt()
-    }
-}
-
-/// Four particles that carry a place, and what they are worth together.
-#[derive(Clone, Copy, Debug)]
-pub struct Handle {
-    particles: [u32; 4],
-    weights: [f32; 4],
-    /// Σ weight² · inverse mass [1/kg]; 0 if none of the four can move.
-    pub inverse_mass: f32,
-}
-
-impl Handle {
-    /// The handle at surface point `point`.
-    pub fn of_point(embedding: &Embedding, point: usize, places: &[Vec4]) -> Self {
-        let (particles, weights) = (embedding.particles[point], embedding.weights[point]);
-        let inverse_mass = (0..4)
-            .map(|k| weights[k] * weights[k] * places[particles[k] as usize].w)
-            .sum();
-        Self {
-            particles,
-            weights,
-            inverse_mass,
-        }
-    }
-
-    /// Where the place is now [m].
-    pub fn place(&self, places: &[Vec4]) -> Vec3 {
-        (0..4)
-            .map(|k| self.weights[k] * places[self.particles[k] as usize].truncate())
-            .sum()
-    }
-
-    /// Moves the particles as an impulse times the substep, `multiplier` [kg m], at the place.
-    pub fn push(&self, places: &mut [Vec4], multiplier: Vec3) {
-        for k in 0..4 {
-            let particle = &mut places[self.particles[k] as usize];
-            *particle += (particle.w * self.weights[k] * multiplier).extend(0.0);
-        }
-    }
-
-    /// The particles that carry the place, each with a weight other than 0.
-    pub fn carriers(&self) -> impl Iterator<Item = u32> {
-        (0..4)
-            .filter(|&k| self.weights[k] != 0.0)
-            .map(|k| self.particles[k])
     }
 }

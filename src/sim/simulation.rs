@@ -2,6 +2,7 @@
 
 use super::{
     BodySetup, SolverParams, StepReport, ToolInput,
+    contact::Surface,
     diagnose::{rest_volume_m3, volume_and_inverted},
     grab::Tissue,
     model::Model,
@@ -194,6 +195,7 @@ impl Simulation {
             }
         }
         self.model.forget(&mut self.particles.places, &self.solver);
+        self.tools.forget_sides();
         self.wake();
         self.publish();
     }
@@ -256,12 +258,16 @@ impl Simulation {
 
     fn advance(&mut self, inputs: &[ToolInput]) {
         let speed_m_s = self.particles.speed_max_m_s();
+        let asleep = self.report.asleep;
         self.tools.begin_step(
             inputs,
             Met {
-                points: &self.points,
-                bounds: self.point_bounds,
-                embedding: &self.setup.embedding,
+                surface: Surface {
+                    triangles: &self.setup.triangles,
+                    points: &self.points,
+                    bounds: self.point_bounds,
+                    embedding: &self.setup.embedding,
+                },
                 particles: &self.particles,
                 tissue: Tissue {
                     youngs_modulus_pa: self.solver.youngs_modulus_pa,
@@ -270,11 +276,13 @@ impl Simulation {
                 },
                 size_m: self.size_m,
                 way_m: 2.0 * speed_m_s * self.solver.timestep_s,
+                asleep,
             },
         );
-        let touched = self.tools.touches(&self.points);
-        if self.report.asleep && !touched {
-            self.report.tool_forces_n = vec![Vec3::ZERO; inputs.len()];
+        let stirred = self.tools.stir(&self.particles, asleep);
+        if asleep && !stirred {
+            // Tools that press or hold are where they were, and so are their forces.
+            self.report.tool_forces_n.resize(inputs.len(), Vec3::ZERO);
             return;
         }
 
@@ -305,7 +313,7 @@ impl Simulation {
         self.publish();
         let (volume, inverted_tets) = volume_and_inverted(&self.positions, &self.sound_tets);
         let speed_max_m_s = self.particles.speed_max_m_s();
-        let calm = !touched && speed_max_m_s < CALM_SIZES_PER_S * self.size_m;
+        let calm = !stirred && speed_max_m_s < CALM_SIZES_PER_S * self.size_m;
         self.calm_steps = if calm { self.calm_steps + 1 } else { 0 };
         self.report = StepReport {
             residual_rms,
@@ -333,7 +341,7 @@ impl Simulation {
             (self.model).begin_substep(team, &mut self.particles.places, &self.solver);
         self.particles
             .predict(team, self.setup.gravity_m_s2, accelerations, substep_s);
-        self.tools.begin_substep();
+        self.tools.begin_substep(&self.particles, from);
         for _ in 0..self.solver.iterations {
             (self.model).project(team, &mut self.particles.places, &self.solver);
             self.tools.solve(&mut self.particles, from, to, substep_s);
@@ -386,6 +394,11 @@ fn check(setup: &BodySetup) {
     assert!(
         setup.embedding.particles.len() == setup.embedding.weights.len(),
         "four weights a surface point"
+    );
+    assert!(
+        (setup.triangles.iter().flatten())
+            .all(|&point| (point as usize) < setup.embedding.particles.len()),
+        "every corner of the surface is a point"
     );
     assert!(
         (setup.tets.tets.iter().chain(&setup.embedding.particles))

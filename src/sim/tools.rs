@@ -2,15 +2,20 @@
 
 use super::{
     ToolAction, ToolInput, ToolShape,
-    contact::{self, Contact, Motion},
+    contact::{ActiveContact, Contacts, Motion, Surface, SweptBox},
     grab::{Grab, Tissue},
-    particles::{Handle, Particles},
+    particles::Particles,
 };
-use crate::geom::Embedding;
-use glam::{Vec3, Vec4};
+use glam::Vec3;
+use std::mem::discriminant;
 
 /// Tools farther from the body than this many body sizes do nothing: single precision ends there.
 const FAR_BODY_SIZES: f32 = 1e4;
+/// Times all tools are solved in turn where more than one touches or holds: what one pushes, the
+/// other may be in the way of.
+const TURNS: usize = 3;
+/// Room round a tool for what its first push sets in motion, over its radius.
+const ROOM_RADII: f32 = 0.1;
 
 /// One tool.
 #[derive(Clone, Debug)]
@@ -18,7 +23,13 @@ struct Tool {
     input: ToolInput,
     /// Where it was when the step started [m].
     from_m: Vec3,
-    contacts: Vec<Contact>,
+    /// Whether it is as it was in the last step.
+    still: bool,
+    /// Whether it has changed since it touched or held the body in the last step.
+    let_go: bool,
+    /// Whether it closes in this step.
+    closes: bool,
+    contacts: Contacts,
     grab: Option<Grab>,
     /// Sum over the substeps of the force on the tool [N].
     force_sum_n: Vec3,
@@ -28,26 +39,29 @@ struct Tool {
 #[derive(Clone, Debug, Default)]
 pub struct Tools {
     tools: Vec<Tool>,
+    /// Whether a tool that touched or held the body is no longer there.
+    gone: bool,
 }
 
 /// The body as the tools meet it at the start of a step.
 #[derive(Clone, Copy)]
 pub struct Met<'a> {
-    pub points: &'a [Vec3],
-    /// Smallest and largest corner of their box [m].
-    pub bounds: (Vec3, Vec3),
-    pub embedding: &'a Embedding,
+    pub surface: Surface<'a>,
     pub particles: &'a Particles,
     pub tissue: Tissue,
     /// Longest extent at rest [m].
     pub size_m: f32,
     /// How far a particle may get in a step [m].
     pub way_m: f32,
+    /// Nothing has moved since the last step.
+    pub asleep: bool,
 }
 
 impl Tools {
-    /// Takes over the inputs of a step, and finds the points each tool may touch in it.
-    pub fn begin_step(&mut self, inputs: &[ToolInput], body: Met) {
+    /// Takes over the inputs of a step, and finds the triangles each tool may touch in it.
+    pub fn begin_step(&mut self, inputs: &[ToolInput], mut body: Met) {
+        let left_out = self.tools.get(inputs.len()..).unwrap_or_default();
+        self.gone = left_out.iter().any(Tool::acts);
         self.tools.truncate(inputs.len());
         for (index, &input) in inputs.iter().enumerate() {
             let input = sane(input, body);
@@ -58,31 +72,53 @@ impl Tools {
                         ..input
                     },
                     from_m: input.position_m,
-                    contacts: Vec::new(),
+                    still: false,
+                    let_go: false,
+                    closes: false,
+                    contacts: Contacts::default(),
                     grab: None,
                     force_sum_n: Vec3::ZERO,
                 });
             }
-            self.tools[index].begin_step(input, body);
+            self.tools[index].take_over(input);
+        }
+        // What a tool pushes or pulls may go as far as the tool.
+        let fastest_m = self.tools.iter().map(Tool::way_m).fold(0.0, f32::max);
+        body.way_m += 2.0 * fastest_m;
+        for tool in &mut self.tools {
+            if !(tool.still && body.asleep) {
+                tool.begin_step(body);
+            }
         }
     }
 
-    /// Whether a tool holds the body, or would touch it on its way through this step.
-    pub fn touches(&self, points: &[Vec3]) -> bool {
-        self.tools.iter().any(|tool| {
-            let to_m = tool.input.position_m;
-            tool.grab.is_some()
-                || tool.contacts.iter().any(|contact| {
-                    let point = points[contact.point as usize];
-                    contact::sweep(tool.input.shape, point - tool.from_m, point - to_m).is_some()
-                })
-        })
+    /// Whether a tool that has changed touches or holds the body, or did so before, or comes to it on
+    /// its way through this step.
+    pub fn stir(&mut self, particles: &Particles, asleep: bool) -> bool {
+        self.gone
+            || self.tools.iter_mut().any(|tool| {
+                let motion = tool.motion(0.0, 1.0);
+                let moves = |contacts: &mut Contacts| {
+                    // Awake, being near is enough and costs no look.
+                    contacts.is_near()
+                        && (!asleep || contacts.would_touch(motion, &particles.places))
+                };
+                tool.let_go || (!tool.still && (tool.grab.is_some() || moves(&mut tool.contacts)))
+            })
+    }
+
+    /// Forgets on which side of the surface each tool is: the body was put elsewhere.
+    pub fn forget_sides(&mut self) {
+        for tool in &mut self.tools {
+            tool.contacts.forget_side();
+        }
     }
 
     /// Forgets the multipliers of the last substep.
-    pub fn begin_substep(&mut self) {
+    pub fn begin_substep(&mut self, particles: &Particles, from: f32) {
         for tool in &mut self.tools {
-            tool.contacts.iter_mut().for_each(Contact::begin_substep);
+            let from_m = tool.at(from);
+            tool.contacts.begin_substep(from_m, &particles.previous);
             if let Some(grab) = &mut tool.grab {
                 grab.begin_substep();
             }
@@ -92,29 +128,72 @@ impl Tools {
     /// Pushes and pulls the particles once. The substep lies between the shares `from` and `to` of
     /// the step.
     pub fn solve(&mut self, particles: &mut Particles, from: f32, to: f32, substep_s: f32) {
-        for tool in &mut self.tools {
-            let at = |share: f32| tool.from_m.lerp(tool.input.position_m, share);
-            let motion = Motion {
-                shape: tool.input.shape,
-                friction: tool.input.friction,
-                from_m: at(from),
-                to_m: at(to),
-            };
-            let (places, previous) = (&mut particles.places, &particles.previous);
-            contact::solve(&mut tool.contacts, motion, places, previous, substep_s);
-            if let Some(grab) = &mut tool.grab {
-                grab.solve(motion.to_m, places, substep_s);
+        let places = &mut particles.places;
+        let busy = |tool: &&Tool| tool.grab.is_some() || tool.contacts.is_near();
+        let turns = match self.tools.iter().filter(busy).count() {
+            0 | 1 => 1,
+            _ => TURNS,
+        };
+        for _ in 0..turns {
+            for tool in &mut self.tools {
+                let position_m = tool.at(to);
+                if let Some(grab) = &mut tool.grab {
+                    grab.solve(position_m, places, substep_s);
+                }
+            }
+            // Contacts last: they give way to nothing.
+            for tool in &mut self.tools {
+                let motion = tool.motion(from, to);
+                tool.contacts.solve(motion, places, substep_s);
             }
         }
+    }
+
+    /// Looks what touches each tool if the particles end the substep where they are now, and lists
+    /// it: contacts up to `margin_m` apart, with the index of their tool. For solvers that find all
+    /// multipliers at once.
+    #[allow(dead_code, reason = "for solvers that find all multipliers at once")]
+    pub fn look(
+        &mut self,
+        particles: &Particles,
+        (from, to): (f32, f32),
+        substep_s: f32,
+        margin_m: f32,
+    ) -> Vec<(usize, ActiveContact)> {
+        let mut found = Vec::new();
+        for (index, tool) in self.tools.iter_mut().enumerate() {
+            let motion = tool.motion(from, to);
+            tool.contacts
+                .look(motion, &particles.places, substep_s, margin_m);
+            let active = tool.contacts.active(motion, &particles.places);
+            found.extend(active.map(|contact| (index, contact)));
+        }
+        found
+    }
+
+    /// Takes over the multipliers, force on the body times h² [kg m], of the contacts that the last
+    /// look listed.
+    ///
+    /// # Panics
+    ///
+    /// If there is not one for each.
+    #[allow(dead_code, reason = "for solvers that find all multipliers at once")]
+    pub fn set_multipliers(&mut self, mut multipliers: &[Vec3]) {
+        for tool in &mut self.tools {
+            let (own, rest) = multipliers.split_at(tool.contacts.len());
+            tool.contacts.set_multipliers(own);
+            multipliers = rest;
+        }
+        assert!(multipliers.is_empty(), "one multiplier a contact");
     }
 
     /// Adds up the forces of a substep.
     pub fn end_substep(&mut self, substep_s: f32) {
         let per_h2 = 1.0 / (substep_s * substep_s);
         for tool in &mut self.tools {
-            let on_body: Vec3 = tool.contacts.iter().map(Contact::multiplier).sum();
             let held = tool.grab.as_ref().map_or(Vec3::ZERO, Grab::multiplier);
-            tool.force_sum_n -= per_h2 * (on_body + held);
+            tool.force_sum_n -= per_h2 * (tool.contacts.multiplier() + held);
+            tool.contacts.end_substep();
         }
     }
 
@@ -127,22 +206,20 @@ impl Tools {
             .collect()
     }
 
-    /// Deepest of `points` inside a pushing tool at the end of a step [m]; 0 if there is none.
+    /// Deepest that a pushing tool is inside the surface at the end of a step [m]; 0 if none is.
     pub fn penetration_max_m(&self, points: &[Vec3]) -> f32 {
-        let mut deepest = 0.0_f32;
-        for tool in &self.tools {
-            for contact in &tool.contacts {
-                let point = points[contact.point as usize];
-                let depth = contact::depth_m(tool.input.shape, tool.input.position_m, point);
-                deepest = deepest.max(depth);
-            }
-        }
-        deepest
+        self.tools
+            .iter()
+            .map(|tool| {
+                let (shape, position_m) = (tool.input.shape, tool.input.position_m);
+                tool.contacts.penetration_m(shape, position_m, points)
+            })
+            .fold(0.0, f32::max)
     }
 }
 
 impl Tool {
-    fn begin_step(&mut self, input: ToolInput, body: Met) {
+    fn take_over(&mut self, input: ToolInput) {
         let before = self.input;
         let goes_on = before.action == input.action && input.action != ToolAction::Idle;
         // A tool that was lifted touches nothing on its way to where it comes down again.
@@ -151,54 +228,68 @@ impl Tool {
         } else {
             input.position_m
         };
+        self.still = before == input;
+        self.let_go = !self.still && self.acts();
+        self.closes = !goes_on && input.action == ToolAction::Grab;
+        let same_kind = discriminant(&before.shape) == discriminant(&input.shape);
+        if !(goes_on && same_kind) {
+            self.contacts.clear();
+        }
+        if !goes_on {
+            self.grab = None;
+        }
         self.input = input;
         self.force_sum_n = Vec3::ZERO;
-        self.contacts.clear();
-        match input.action {
-            ToolAction::Idle => self.grab = None,
-            ToolAction::Push => {
-                self.grab = None;
-                self.find_contacts(body);
-            }
-            ToolAction::Grab => {
-                if !goes_on {
-                    self.grab = Grab::close(
-                        input.position_m,
-                        input.shape.radius_m(),
-                        body.points,
-                        body.embedding,
-                        &body.particles.places,
-                        body.tissue,
-                    );
-                }
-            }
+    }
+
+    fn begin_step(&mut self, body: Met) {
+        let shape = self.input.shape;
+        let places = &body.particles.places;
+        if self.input.action == ToolAction::Push {
+            let ends = [self.from_m, self.input.position_m];
+            let room_m = ROOM_RADII * shape.radius_m() + body.way_m;
+            let swept = SweptBox::new(shape, ends, room_m);
+            (self.contacts).begin_step(shape, self.from_m, swept, body.surface, places);
+        }
+        if self.closes {
+            self.grab = Grab::close(
+                self.input.position_m,
+                shape.radius_m(),
+                body.surface.points,
+                body.surface.embedding,
+                places,
+                body.tissue,
+            );
         }
     }
 
-    /// Lists the points within the box that the tool sweeps, with room for their own way.
-    fn find_contacts(&mut self, body: Met) {
-        let axis = self.input.shape.axis_m();
-        let radius = self.input.shape.radius_m();
-        let ends = [self.from_m, self.input.position_m];
-        let room = Vec3::splat(1.5 * radius + body.way_m);
-        let low = ends[0].min(ends[1]) + axis.min(Vec3::ZERO) - room;
-        let high = ends[0].max(ends[1]) + axis.max(Vec3::ZERO) + room;
-        if low.cmpgt(body.bounds.1).any() || high.cmplt(body.bounds.0).any() {
-            return;
-        }
-        let places: &[Vec4] = &body.particles.places;
-        for (index, point) in body.points.iter().enumerate() {
-            if point.cmpge(low).all() && point.cmple(high).all() {
-                let handle = Handle::of_point(body.embedding, index, places);
-                self.contacts.push(Contact::new(index as u32, handle));
-            }
+    /// Whether it touched or held the body in the last substep.
+    fn acts(&self) -> bool {
+        self.grab.is_some() || self.contacts.pressed()
+    }
+
+    /// Where it is at this share of the step [m].
+    fn at(&self, share: f32) -> Vec3 {
+        self.from_m.lerp(self.input.position_m, share)
+    }
+
+    fn way_m(&self) -> f32 {
+        self.from_m.distance(self.input.position_m)
+    }
+
+    fn motion(&self, from: f32, to: f32) -> Motion {
+        Motion {
+            shape: self.input.shape,
+            friction: self.input.friction,
+            from_m: self.at(from),
+            to_m: self.at(to),
         }
     }
 }
 
 /// The input as it can be used: idle if it is not finite, absurdly far, or has no size.
 fn sane(input: ToolInput, body: Met) -> ToolInput {
-    let centre = (body.bounds.0 + body.bounds.1) / 2.0;
+    let centre = (body.surface.bounds.0 + body.surface.bounds.1) / 2.0;
     let reach = FAR_BODY_SIZES * body.size_m;
     let near = |x: Vec3| x.is_finite() && x.abs().max_element() < reach;
     let radius_m = input.shape.radius_m();
