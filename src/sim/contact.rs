@@ -33,11 +33,13 @@ const DEPENETRATION_SPEED_M_S: f32 = 0.5;
 /// Sweeps over the touches between two looks at the surface, if they do not settle before.
 const SWEEPS_MAX: usize = 12;
 /// Touches have settled when none moves its place by more than this share of the largest move.
-const SETTLED_SHARE: f32 = 0.01;
+const SETTLED_SHARE: f32 = 0.001;
 /// Looks at the surface in one solve, if it does not settle before.
 const LOOKS_MAX: usize = 8;
 /// The surface is looked at again when a place was moved by more than this share of the radius.
 const LOOK_AGAIN_RADII: f32 = 0.02;
+/// No guess moves a place by more than this share of the radius.
+const PRESS_ON_RADII: f32 = 0.5;
 /// A triangle that moves by less than this share of its distance from the axis cannot have
 /// passed it.
 const PASSING_SHARE: f32 = 0.9;
@@ -111,7 +113,7 @@ impl Contacts {
 
     /// Whether the tool pressed on the body in the last substep.
     pub fn pressed(&self) -> bool {
-        (self.vicinity.near.iter()).any(|near| near.last_multiplier != Vec3::ZERO)
+        self.touches.iter().any(Touch::presses)
     }
 
     /// Whether the tool may touch the body in this step.
@@ -137,9 +139,9 @@ impl Contacts {
     ) {
         let pressed = self.pressed();
         let released = std::mem::replace(&mut self.pressed_before, pressed) && !pressed;
-        self.touches.clear();
         if swept.misses(surface.bounds) {
             self.vicinity.clear();
+            self.touches.clear();
             self.side = Side::Outside;
             return;
         }
@@ -155,23 +157,37 @@ impl Contacts {
         if self.side == Side::Inside {
             self.vicinity.find_way_out(from_m, surface, places);
         }
+        // Both lists are in the order of the surface.
+        let mut near = (self.vicinity.near.iter().zip(0..)).peekable();
+        self.touches.sort_unstable_by_key(|touch| touch.key);
+        self.touches.retain_mut(|touch| {
+            while near.next_if(|(near, _)| near.key < touch.key).is_some() {}
+            let found = near.next_if(|(near, _)| near.key == touch.key);
+            touch.near = found.map_or(0, |(_, index)| index);
+            found.is_some()
+        });
     }
 
     /// Takes over where the surface is at the start of a substep.
     pub fn begin_substep(&mut self, from_m: Vec3, previous: &[Vec4]) {
-        self.touches.clear();
         self.vicinity.begin_substep(from_m, previous);
+        // What pressed goes on with what it pressed with.
+        self.touches.retain_mut(Touch::begin_substep);
+        for (touch, index) in self.touches.iter().zip(0..) {
+            self.vicinity.near[touch.near as usize].touch = Some(index);
+        }
     }
 
-    /// Remembers what was pushed, to begin with in the next substep.
-    pub fn end_substep(&mut self) {
-        for near in &mut self.vicinity.near {
-            near.last_multiplier = Vec3::ZERO;
-        }
-        for touch in &self.touches {
-            let near = &mut self.vicinity.near[touch.near as usize];
-            near.last_multiplier = touch.multiplier;
-            near.last_normal = touch.normal;
+    /// Pushes as in the last substep, before anything else does: what rests is pushed by the right
+    /// amount then, and the elastic constraints answer to it as they do to gravity.
+    pub fn press_on(&mut self, tool: Motion, places: &mut [Vec4]) {
+        let farthest_m = (self.touches.iter())
+            .map(|touch| touch.guess.length() * touch.handle.inverse_mass)
+            .fold(0.0, f32::max);
+        // In long substeps the guess is no small push, and what it moves far is not at rest.
+        let share = (PRESS_ON_RADII * tool.shape.radius_m() / farthest_m).min(1.0);
+        for touch in &mut self.touches {
+            touch.push_guess(share, tool.friction, places);
         }
     }
 
@@ -179,20 +195,22 @@ impl Contacts {
     pub fn would_touch(&mut self, tool: Motion, places: &[Vec4]) -> bool {
         self.begin_substep(tool.from_m, places);
         self.look(tool, places, f32::MAX, 0.0);
-        let found = !self.touches.is_empty();
-        self.touches.clear();
-        found
+        !std::mem::take(&mut self.touches).is_empty()
     }
 
-    /// Finds what touches the tool, and pushes it out, with friction.
-    pub fn solve(&mut self, tool: Motion, places: &mut [Vec4], substep_s: f32) {
+    /// Finds what touches the tool, and pushes it out, with friction. How far a place was moved at
+    /// most [m].
+    pub fn solve(&mut self, tool: Motion, places: &mut [Vec4], substep_s: f32) -> f32 {
+        let mut most_m = 0.0_f32;
         for _ in 0..LOOKS_MAX {
             self.look(tool, places, substep_s, 0.0);
             let moved_m = self.push(tool, places);
+            most_m = most_m.max(moved_m);
             if moved_m <= LOOK_AGAIN_RADII * tool.shape.radius_m() {
                 break;
             }
         }
+        most_m
     }
 
     /// The contacts that the last look found.
@@ -267,7 +285,8 @@ impl Contacts {
             let found = if inside {
                 Some(seen.from_inside())
             } else {
-                seen.from_outside(near)
+                let known = near.touch.map(|touch| self.touches[touch as usize].normal);
+                seen.from_outside(near, known)
             };
             let Some(found) = found else { continue };
             let carriers = near.carriers(carriers, corners);
@@ -276,6 +295,7 @@ impl Contacts {
                 continue;
             }
             let touch = Touch {
+                key: near.key,
                 near: index as u32,
                 handle,
                 normal: found.normal,
@@ -283,7 +303,7 @@ impl Contacts {
                 start: blend(found.weights, start),
                 target_m: (found.start_gap_m + leave_m).min(0.0),
                 multiplier: Vec3::ZERO,
-                guess: near.last_multiplier,
+                guess: Vec3::ZERO,
             };
             match near.touch {
                 None => {
@@ -295,8 +315,6 @@ impl Contacts {
                     let known = &mut self.touches[known as usize];
                     *known = Touch {
                         multiplier: known.multiplier,
-                        guess: Vec3::ZERO,
-                        target_m: known.target_m,
                         ..touch
                     };
                 }
@@ -306,11 +324,9 @@ impl Contacts {
 
     /// Sweeps over the touches until they settle. How far a place was moved at most [m].
     fn push(&mut self, tool: Motion, places: &mut [Vec4]) -> f32 {
-        let mut scale_m = 0.0_f32;
-        for touch in &mut self.touches {
-            scale_m = scale_m.max(touch.push_guess(tool, places));
-        }
-        let mut moved_m = scale_m;
+        let pressed_m = |touch: &Touch| touch.multiplier.length() * touch.handle.inverse_mass;
+        let mut scale_m = self.touches.iter().map(pressed_m).fold(0.0, f32::max);
+        let mut moved_m = 0.0;
         for _ in 0..SWEEPS_MAX {
             let mut worst_m = 0.0_f32;
             self.backwards = !self.backwards;
@@ -378,21 +394,21 @@ struct Found {
 
 impl Seen {
     /// A triangle that was outside the tool, or nearly so, when the substep started.
-    fn from_outside(&self, near: &mut Near) -> Option<Found> {
+    fn from_outside(&self, near: &mut Near, known: Option<Vec3>) -> Option<Found> {
         let slow = self.way_m < PASSING_SHARE * (near.clear_m + self.radius_m);
         if slow && self.way_m < SLOW_RADII * self.radius_m {
             let found = nearest(self.axis, self.end);
             let gap_m = found.distance_m() - self.radius_m;
             near.clear_m = near.clear_m.max(gap_m - self.way_m);
-            if gap_m >= self.margin_m && near.touch.is_none() {
+            if gap_m >= self.margin_m && known.is_none() {
                 return None;
             }
-            let (normal, _) = self.on_its_side(&found, self.end, near);
+            let (normal, _) = self.on_its_side(&found, self.end, known);
             let start = blend(found.weights, self.start) - found.foot;
             return Some(self.found(found, normal, normal.dot(start) - self.radius_m));
         }
         let at_start = nearest(self.axis, self.start);
-        let (start_normal, side) = self.on_its_side(&at_start, self.start, near);
+        let (start_normal, side) = self.on_its_side(&at_start, self.start, known);
         let start_gap_m = side * at_start.distance_m() - self.radius_m;
         near.clear_m = start_gap_m;
         if side < 0.0 {
@@ -400,24 +416,26 @@ impl Seen {
         }
         if self.way_m < PASSING_SHARE * at_start.distance_m() {
             let found = nearest(self.axis, self.end);
-            if found.distance_m() - self.radius_m >= self.margin_m && near.touch.is_none() {
+            if found.distance_m() - self.radius_m >= self.margin_m && known.is_none() {
                 return None;
             }
             let normal = found.normal(self.end);
             return Some(self.found(found, normal, start_gap_m));
         }
-        let hit = sweep(
-            self.axis,
-            self.radius_m + self.margin_m,
-            self.start,
-            self.end,
-        )?;
-        Some(Found {
-            normal: hit.normal,
-            foot: hit.foot,
-            weights: hit.weights,
-            start_gap_m,
-        })
+        let reach_m = self.radius_m + self.margin_m;
+        match sweep(self.axis, reach_m, self.start, self.end) {
+            Some(hit) => Some(Found {
+                normal: hit.normal,
+                foot: hit.foot,
+                weights: hit.weights,
+                start_gap_m,
+            }),
+            // It never comes to the tool: what pressed may let go.
+            None => known.map(|_| {
+                let found = nearest(self.axis, self.end);
+                self.found(found, found.normal(self.end), start_gap_m)
+            }),
+        }
     }
 
     /// The triangle that is to be drawn over a tool inside the body.
@@ -440,10 +458,10 @@ impl Seen {
 
     /// The normal of the nearest place, and whether the place is on the side of the axis where it
     /// was in the last substep: 1 if so, −1 if the axis has gone through the face since.
-    fn on_its_side(&self, found: &Nearest, corners: [Vec3; 3], near: &Near) -> (Vec3, f32) {
+    fn on_its_side(&self, found: &Nearest, corners: [Vec3; 3], known: Option<Vec3>) -> (Vec3, f32) {
         let normal = found.normal(corners);
         let on_face = found.weights.min_element() > 0.0;
-        if on_face && normal.dot(near.last_normal) < OTHER_SIDE_COSINE {
+        if on_face && known.is_some_and(|known| normal.dot(known) < OTHER_SIDE_COSINE) {
             (-normal, -1.0)
         } else {
             (normal, 1.0)

@@ -342,6 +342,7 @@ impl Simulation {
         self.particles
             .predict(team, self.setup.gravity_m_s2, accelerations, substep_s);
         self.tools.begin_substep(&self.particles, from);
+        self.tools.press_on(&mut self.particles, from, to);
         for _ in 0..self.solver.iterations {
             (self.model).project(team, &mut self.particles.places, &self.solver);
             self.tools.solve(&mut self.particles, from, to, substep_s);

@@ -14,6 +14,8 @@ const FAR_BODY_SIZES: f32 = 1e4;
 /// Times all tools are solved in turn where more than one touches or holds: what one pushes, the
 /// other may be in the way of.
 const TURNS: usize = 3;
+/// The last turn is the one whose contacts move nothing by more than this share of the most so far.
+const SETTLED_SHARE: f32 = 0.01;
 /// Room round a tool for what its first push sets in motion, over its radius.
 const ROOM_RADII: f32 = 0.1;
 
@@ -114,7 +116,7 @@ impl Tools {
         }
     }
 
-    /// Forgets the multipliers of the last substep.
+    /// Starts a substep, once the particles have been moved by their velocities.
     pub fn begin_substep(&mut self, particles: &Particles, from: f32) {
         for tool in &mut self.tools {
             let from_m = tool.at(from);
@@ -122,6 +124,14 @@ impl Tools {
             if let Some(grab) = &mut tool.grab {
                 grab.begin_substep();
             }
+        }
+    }
+
+    /// Lets tools that pressed in the last substep press on, before anything else answers.
+    pub fn press_on(&mut self, particles: &mut Particles, from: f32, to: f32) {
+        for tool in &mut self.tools {
+            let motion = tool.motion(from, to);
+            tool.contacts.press_on(motion, &mut particles.places);
         }
     }
 
@@ -134,6 +144,7 @@ impl Tools {
             0 | 1 => 1,
             _ => TURNS,
         };
+        let mut most_m = 0.0_f32;
         for _ in 0..turns {
             for tool in &mut self.tools {
                 let position_m = tool.at(to);
@@ -142,9 +153,14 @@ impl Tools {
                 }
             }
             // Contacts last: they give way to nothing.
+            let mut moved_m = 0.0_f32;
             for tool in &mut self.tools {
                 let motion = tool.motion(from, to);
-                tool.contacts.solve(motion, places, substep_s);
+                moved_m = moved_m.max(tool.contacts.solve(motion, places, substep_s));
+            }
+            most_m = most_m.max(moved_m);
+            if moved_m <= SETTLED_SHARE * most_m {
+                break;
             }
         }
     }
@@ -193,7 +209,6 @@ impl Tools {
         for tool in &mut self.tools {
             let held = tool.grab.as_ref().map_or(Vec3::ZERO, Grab::multiplier);
             tool.force_sum_n -= per_h2 * (tool.contacts.multiplier() + held);
-            tool.contacts.end_substep();
         }
     }
 

@@ -82,19 +82,14 @@ impl NearPoint {
 /// A triangle near a piece of the tool.
 #[derive(Clone, Copy, Debug)]
 pub struct Near {
-    /// Its index in the surface.
-    pub triangle: u32,
-    /// Which half of a capsule's axis.
-    piece: u8,
+    /// Its index in the surface, and which half of a capsule's axis it is near.
+    pub key: (u32, u8),
     /// Its corners, as indices of near points.
     pub corners: [u32; 3],
     /// At least so far outside the tool when the substep started [m].
     pub clear_m: f32,
     /// Its touch in this substep.
     pub touch: Option<u32>,
-    /// Multiplier and normal of its touch in the last substep in which it had one.
-    pub last_multiplier: Vec3,
-    pub last_normal: Vec3,
     /// Its carriers, once they have been needed.
     carriers: Option<u32>,
 }
@@ -106,7 +101,7 @@ impl Near {
     /// rock.
     #[inline]
     pub fn axis(&self, shape: ToolShape) -> Axis {
-        piece_axis(shape, self.piece)
+        piece_axis(shape, self.key.1)
     }
 
     /// Its carriers, from `all` that have been needed so far.
@@ -135,12 +130,10 @@ fn piece_axis(shape: ToolShape, piece: u8) -> Axis {
 /// All triangles near a tool.
 #[derive(Clone, Debug, Default)]
 pub struct Vicinity {
-    /// In the order of the surface, one after the other piece.
+    /// In the order of their keys.
     pub near: Vec<Near>,
     pub points: Vec<NearPoint>,
     pub carriers: Vec<TriangleCarriers>,
-    /// Near triangles of the step before.
-    before: Vec<Near>,
     /// Sides of the box beyond which each point of the surface lies.
     beyond: Vec<u8>,
     /// The near point of each point of the surface, or none.
@@ -156,9 +149,8 @@ impl Vicinity {
         self.carriers.clear();
     }
 
-    /// Lists the triangles whose boxes meet `swept`. What they remember of the last step stays.
+    /// Lists the triangles whose boxes meet `swept` and that it can reach.
     pub fn find(&mut self, shape: ToolShape, from_m: Vec3, swept: SweptBox, surface: Surface) {
-        std::mem::swap(&mut self.near, &mut self.before);
         self.clear();
         self.beyond.clear();
         self.beyond
@@ -168,21 +160,13 @@ impl Vicinity {
             ToolShape::Sphere { .. } => 1,
             ToolShape::Capsule { .. } => 2,
         };
-        let mut before = std::mem::take(&mut self.before);
-        let mut known = before.iter().peekable();
         for (index, triangle) in surface.triangles.iter().enumerate() {
             let [a, b, c] = triangle.map(|point| self.beyond[point as usize]);
             if a & b & c != 0 {
                 continue;
             }
             for piece in 0..pieces {
-                let key = (index as u32, piece);
-                while known
-                    .next_if(|near| (near.triangle, near.piece) < key)
-                    .is_some()
-                {}
-                let last = known.next_if(|near| (near.triangle, near.piece) == key);
-                self.add(key, shape, from_m, surface, last);
+                self.add((index as u32, piece), shape, from_m, surface);
                 if self
                     .near
                     .last()
@@ -192,8 +176,6 @@ impl Vicinity {
                 }
             }
         }
-        before.clear();
-        self.before = before;
         for point in &self.points {
             self.near_of[point.point as usize] = NONE;
         }
@@ -205,7 +187,6 @@ impl Vicinity {
         shape: ToolShape,
         from_m: Vec3,
         surface: Surface,
-        last: Option<&Near>,
     ) {
         let corners = surface.triangles[triangle as usize].map(|point| {
             let known = &mut self.near_of[point as usize];
@@ -226,13 +207,10 @@ impl Vicinity {
         let places = corners.map(|k| self.points[k as usize].start);
         let near = nearest(piece_axis(shape, piece), places);
         self.near.push(Near {
-            triangle,
-            piece,
+            key: (triangle, piece),
             corners,
             clear_m: near.distance_m() - shape.radius_m(),
             touch: None,
-            last_multiplier: last.map_or(Vec3::ZERO, |near| near.last_multiplier),
-            last_normal: last.map_or(Vec3::ZERO, |near| near.last_normal),
             carriers: None,
         });
     }
@@ -259,7 +237,7 @@ impl Vicinity {
         if let Some((index, _)) = way_out {
             self.near_of.resize(surface.points.len(), NONE);
             let shape = ToolShape::Sphere { radius_m: 0.0 };
-            self.add((index as u32, 0), shape, tip_m, surface, None);
+            self.add((index as u32, 0), shape, tip_m, surface);
             self.near[0].clear_m = f32::NEG_INFINITY;
             for point in &self.points {
                 self.near_of[point.point as usize] = NONE;

@@ -7,7 +7,9 @@ use glam::{Vec3, Vec4};
 /// back along that plane.
 #[derive(Clone, Copy, Debug)]
 pub struct Touch {
-    /// Index of its triangle in the vicinity.
+    /// Its triangle and piece of the axis.
+    pub key: (u32, u8),
+    /// The same as an index in the vicinity.
     pub near: u32,
     pub handle: Handle,
     /// From the axis towards the place, of length 1.
@@ -21,7 +23,7 @@ pub struct Touch {
     /// What has been pushed so far [kg m]: never towards the tool, and along the tangent plane no
     /// more than friction allows.
     pub multiplier: Vec3,
-    /// The multiplier of the last substep: a good guess of this one's [kg m].
+    /// The multiplier of the last substep, until it is pushed [kg m].
     pub guess: Vec3,
 }
 
@@ -44,16 +46,25 @@ impl Touch {
         slip - self.normal.dot(slip) * self.normal
     }
 
-    /// Pushes by what was pushed in the last substep. How far that moves the place [m].
-    pub fn push_guess(&mut self, tool: Motion, places: &mut [Vec4]) -> f32 {
-        if self.guess == Vec3::ZERO {
-            return 0.0;
+    /// Whether it has pushed in this substep.
+    pub fn presses(&self) -> bool {
+        self.multiplier != Vec3::ZERO
+    }
+
+    /// Sets the multiplier to 0, as a substep starts. Whether it pushed in the last.
+    pub fn begin_substep(&mut self) -> bool {
+        self.guess = std::mem::take(&mut self.multiplier);
+        self.guess != Vec3::ZERO
+    }
+
+    /// Pushes by a share of what was pushed in the last substep.
+    pub fn push_guess(&mut self, share: f32, friction: f32, places: &mut [Vec4]) {
+        let guess = share * std::mem::take(&mut self.guess);
+        let (pushed, held) = self.split(guess);
+        let held = held.clamp_length_max(friction * pushed.max(0.0));
+        if pushed > 0.0 {
+            self.push_to(pushed * self.normal + held, places);
         }
-        let (pushed, held) = self.split(self.guess);
-        let pushed = pushed.max(0.0);
-        let held = held.clamp_length_max(tool.friction * pushed);
-        self.guess = Vec3::ZERO;
-        self.push_to(pushed * self.normal + held, places)
     }
 
     /// One projection. How far it moves the place [m].
