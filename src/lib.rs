@@ -2,6 +2,7 @@
 //!
 //! * [`geom`]: shapes and their differential geometry. No time, no GPU.
 //! * [`sim`]: the body in time. No GPU.
+//! * [`reference`]: the same body solved to rounding in f64, for tests and studies to be held to.
 //! * [`optics`]: light in layers, as pure functions.
 //! * [`gpu`]: adapter, device, buffers, timestamps. No physics, no scene.
 //! * [`scene`]: what a scene file says, as checked plain data.
@@ -17,5 +18,6 @@ pub mod gpu;
 pub mod measure;
 pub mod optics;
 pub mod passes;
+pub mod reference;
 pub mod scene;
 pub mod sim;

@@ -14,18 +14,34 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("gpu", &[]),
     ("sim", &["geom"]),
     ("scene", &["geom", "sim", "optics"]),
-    ("oracle", &["geom", "sim", "optics"]),
+    ("reference", &["geom"]),
     ("passes", &["geom", "optics", "gpu", "scene"]),
     (
         "study",
         &[
-            "geom", "sim", "optics", "gpu", "scene", "passes", "measure", "oracle", "app",
+            "geom",
+            "sim",
+            "optics",
+            "gpu",
+            "scene",
+            "passes",
+            "measure",
+            "reference",
+            "app",
         ],
     ),
     (
         "app",
         &[
-            "geom", "sim", "optics", "gpu", "scene", "passes", "measure", "oracle", "study",
+            "geom",
+            "sim",
+            "optics",
+            "gpu",
+            "scene",
+            "passes",
+            "measure",
+            "reference",
+            "study",
         ],
     ),
 ];
@@ -34,10 +50,11 @@ const MAY_USE: &[(&str, &[&str])] = &[
 const CRATE_PLACES: &[(&str, &[&str])] = &[
     ("winit", &["app/"]),
     ("egui", &["app/"]),
+    ("faer", &["reference/"]),
     ("gltf", &["geom/import"]),
     ("tobj", &["geom/"]),
     ("rayon", &["sim/", "geom/"]),
-    ("nalgebra", &["geom/", "oracle/"]),
+    ("nalgebra", &["geom/", "reference/"]),
     ("wgpu", &["gpu/", "passes/", "app/", "study/"]),
 ];
 

@@ -83,6 +83,9 @@ fn with_first([g1, g2, g3]: [Vec3; 3]) -> [Vec3; 4] {
 }
 
 #[cfg(test)]
+mod gradients;
+
+#[cfg(test)]
 mod tests {
     use super::*;
     use glam::DVec3;

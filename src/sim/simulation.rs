@@ -200,6 +200,28 @@ impl Simulation {
         self.publish();
     }
 
+    /// Puts every held particle to where `positions` has it [m], and holds it there; wakes the body.
+    /// Free particles stay where they are.
+    ///
+    /// # Panics
+    ///
+    /// If there is not one position a particle, or one of a held particle is not finite.
+    pub fn hold_at(&mut self, positions: &[Vec3]) {
+        assert_eq!(
+            positions.len(),
+            self.positions.len(),
+            "one position a particle"
+        );
+        for (i, &position) in positions.iter().enumerate() {
+            if self.setup.fixed[i] {
+                assert!(position.is_finite(), "a particle is held somewhere");
+                self.particles.places[i] = position.extend(0.0);
+            }
+        }
+        self.wake();
+        self.publish();
+    }
+
     /// Particle positions [m].
     pub fn particles(&self) -> &[Vec3] {
         &self.positions

@@ -1,0 +1,25 @@
+//! The right answer at length: the tissue's equations on the same mesh, solved to rounding in f64.
+//!
+//! [`Fem`] is a body of linear tetrahedra of stable neo-Hookean tissue, the material of
+//! `xpbd-neo-hookean`. [`Fem::statics`] finds where it comes to rest by Newton's method,
+//! [`Fem::swing`] how it moves by the implicit midpoint rule. Slow, exact and without any part in
+//! common with the solvers, so that tests and studies can hold those to it.
+//!
+//! Sources: Smith, de Goes, Kim, "Stable Neo-Hookean Flesh Simulation", ACM TOG 37, 2018 (energy);
+//! Nocedal, Wright, "Numerical Optimization", 2006, ch. 3 (line search, shifted Hessian); Hairer,
+//! Lubich, Wanner, "Geometric Numerical Integration", 2006, ch. VI (midpoint rule).
+
+mod dynamics;
+mod fem;
+mod material;
+mod newton;
+mod sparse;
+mod statics;
+
+pub use dynamics::{State, Swing};
+pub use fem::{Fem, FemSetup};
+pub use material::Material;
+pub use statics::{NoEquilibrium, Statics};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,181 @@
+//! Every constraint on random tetrahedra: its value against its definition in f64, its gradient
+//! against central differences of that.
+
+use super::*;
+use glam::{DMat3, DQuat, DVec3};
+use proptest::prelude::*;
+
+/// A definition: the value of a constraint at f64 corners, given the rest corners.
+type Definition<const N: usize> = fn([DVec3; N], [DVec3; N]) -> f64;
+/// The constraint under test, given the rest corners.
+type Constraint<const N: usize> = fn([Vec3; N], [Vec3; N]) -> Option<Linearized<N>>;
+
+fn length(x: [DVec3; 2], rest: [DVec3; 2]) -> f64 {
+    x[0].distance(x[1]) - rest[0].distance(rest[1])
+}
+
+fn six_volumes(x: [DVec3; 4]) -> f64 {
+    (x[1] - x[0]).dot((x[2] - x[0]).cross(x[3] - x[0]))
+}
+
+fn volume_change(x: [DVec3; 4], rest: [DVec3; 4]) -> f64 {
+    (six_volumes(x) - six_volumes(rest)) / 6.0
+}
+
+fn relative_volume_change(x: [DVec3; 4], rest: [DVec3; 4]) -> f64 {
+    six_volumes(x) / six_volumes(rest) - 1.0
+}
+
+fn shape_change(x: [DVec3; 4], rest: [DVec3; 4]) -> f64 {
+    let columns = |x: [DVec3; 4]| DMat3::from_cols(x[1] - x[0], x[2] - x[0], x[3] - x[0]);
+    let f = columns(x) * columns(rest).inverse();
+    let j = f.determinant();
+    let squares: f64 = f.to_cols_array().iter().map(|v| v * v).sum();
+    (squares + j * j - 4.0 * j).max(0.0).sqrt()
+}
+
+fn inverse_of(rest: [Vec3; 4]) -> Mat3 {
+    let [a, b, c] = edges(rest).map(|edge| edge.as_dvec3());
+    DMat3::from_cols(a, b, c).inverse().as_mat3()
+}
+
+const DISTANCE: (Constraint<2>, Definition<2>) = (
+    |x, rest| {
+        let rest_length_m = rest[0].as_dvec3().distance(rest[1].as_dvec3());
+        distance(x, rest_length_m as f32)
+    },
+    length,
+);
+const VOLUME: (Constraint<4>, Definition<4>) = (
+    |x, rest| {
+        let rest_volume_m3 = six_volumes(rest.map(|x| x.as_dvec3())) / 6.0;
+        Some(volume(x, rest_volume_m3 as f32))
+    },
+    volume_change,
+);
+const DILATION: (Constraint<4>, Definition<4>) = (
+    |x, rest| Some(dilation(x, inverse_of(rest))),
+    relative_volume_change,
+);
+const SHAPE: (Constraint<4>, Definition<4>) = (|x, rest| shape(x, inverse_of(rest)), shape_change);
+
+/// Largest difference of the gradient from central differences of the definition, over the largest
+/// gradient; `None` where the constraint has no direction.
+fn gradient_error<const N: usize>(
+    (constraint, definition): (Constraint<N>, Definition<N>),
+    x: [Vec3; N],
+    rest: [Vec3; N],
+) -> Option<f64> {
+    // Of edges of about 1: 1e-10 from the third derivative, 1e-11 from rounding.
+    const STEP: f64 = 1e-5;
+    let found = constraint(x, rest)?.gradient;
+    let (x, rest) = (x.map(|x| x.as_dvec3()), rest.map(|x| x.as_dvec3()));
+    let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
+    for particle in 0..N {
+        for axis in 0..3 {
+            let (mut ahead, mut behind) = (x, x);
+            ahead[particle][axis] += STEP;
+            behind[particle][axis] -= STEP;
+            let slope = (definition(ahead, rest) - definition(behind, rest)) / (2.0 * STEP);
+            worst = worst.max((slope - f64::from(found[particle][axis])).abs());
+            largest = largest.max(slope.abs());
+        }
+    }
+    Some(worst / largest)
+}
+
+/// Single precision on a tetrahedron whose rest height is a fifth of its edges: a few hundred
+/// roundings of 6e-8. What the root of `shape` loses near rest comes on top: see `far_from_rest`.
+const TOLERANCE: f64 = 2e-4;
+
+/// Corners of a tetrahedron of edges of about 1 that is not flat, anywhere within 1 of the origin.
+fn rest_corners() -> impl Strategy<Value = [Vec3; 4]> {
+    let moves = prop::array::uniform12(-0.25_f32..0.25);
+    let axis = prop::array::uniform3(-1.0_f64..1.0);
+    (moves, axis, -3.0_f64..3.0).prop_map(|(moves, axis, angle)| {
+        let turn = DQuat::from_axis_angle(DVec3::from_array(axis).normalize_or(DVec3::X), angle);
+        std::array::from_fn(|k| {
+            let corner = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z][k];
+            let moved = Vec3::from_slice(&moves[3 * k..]).as_dvec3();
+            (turn * (corner + moved)).as_vec3()
+        })
+    })
+}
+
+/// Where corners are moved to: up to 0.8 each, so that some tetrahedra are flat or inverted.
+fn moves() -> impl Strategy<Value = [f32; 12]> {
+    prop::array::uniform12(-0.8_f32..0.8)
+}
+
+fn moved(rest: [Vec3; 4], moves: [f32; 12]) -> [Vec3; 4] {
+    std::array::from_fn(|k| rest[k] + Vec3::from_slice(&moves[3 * k..]))
+}
+
+/// Whether the root of [`shape`] is clear of 0, where rounding has a share of C in its direction.
+fn far_from_rest(x: [Vec3; 4], rest: [Vec3; 4]) -> bool {
+    shape_change(x.map(|x| x.as_dvec3()), rest.map(|x| x.as_dvec3())) > 0.05
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1000))]
+    #[test]
+    fn gradients_of_all_constraints_are_the_slopes_of_their_definitions(
+        rest in rest_corners(), moves in moves(),
+    ) {
+        let x = moved(rest, moves);
+        let (edge, rest_edge) = ([x[0], x[1]], [rest[0], rest[1]]);
+        if edge[0].distance(edge[1]) > 0.05 {
+            let error = gradient_error(DISTANCE, edge, rest_edge).expect("the ends are apart");
+            prop_assert!(error < TOLERANCE, "distance: {error}");
+        }
+        let error = gradient_error(VOLUME, x, rest).expect("a volume has a gradient");
+        prop_assert!(error < TOLERANCE, "volume: {error}");
+        let error = gradient_error(DILATION, x, rest).expect("a dilation has a gradient");
+        prop_assert!(error < TOLERANCE, "dilation: {error}");
+        if far_from_rest(x, rest) {
+            let error = gradient_error(SHAPE, x, rest).expect("the shape has changed");
+            prop_assert!(error < TOLERANCE, "shape: {error}");
+        }
+    }
+
+    #[test]
+    fn gradients_of_a_constraint_add_up_to_nothing(rest in rest_corners(), moves in moves()) {
+        let x = moved(rest, moves);
+        let all = [DISTANCE.0([x[0], x[1]], [rest[0], rest[1]]).map(|c| c.gradient.to_vec())];
+        let tets = [VOLUME.0, DILATION.0, SHAPE.0].map(|c| c(x, rest).map(|c| c.gradient.to_vec()));
+        for gradient in all.into_iter().chain(tets).flatten() {
+            let sum: Vec3 = gradient.iter().sum();
+            let largest = gradient.iter().map(|g| g.length()).fold(0.0, f32::max);
+            // A shift of all corners changes nothing; the sum itself rounds.
+            prop_assert!(sum.length() <= 1e-6 * largest, "{sum} of {largest}");
+        }
+    }
+}
+
+/// The same tetrahedron for the checks of the check.
+const REST: [Vec3; 4] = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+const MOVED: [Vec3; 4] = [
+    Vec3::new(0.1, 0.0, -0.1),
+    Vec3::new(1.3, 0.2, 0.0),
+    Vec3::new(0.0, 0.9, 0.1),
+    Vec3::new(0.1, -0.1, 1.2),
+];
+
+#[test]
+fn gradient_check_rejects_another_definition() {
+    let swapped = (VOLUME.0, DILATION.1);
+    let error = gradient_error(swapped, MOVED, REST).expect("a volume has a gradient");
+    // Six times too small.
+    assert!((error - 5.0 / 6.0).abs() < 0.01, "{error}");
+}
+
+#[test]
+fn gradient_check_rejects_a_shape_of_a_slightly_wrong_factor() {
+    // √(tr FᵀF + J² − 4.02 J): half a per cent of one term.
+    let off: Definition<4> = |x, rest| {
+        let j = relative_volume_change(x, rest) + 1.0;
+        (shape_change(x, rest).powi(2) - 0.02 * j).sqrt()
+    };
+    let error = gradient_error((SHAPE.0, off), MOVED, REST).expect("the shape has changed");
+    assert!(error > 5.0 * TOLERANCE, "{error}");
+}
