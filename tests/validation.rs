@@ -36,9 +36,36 @@ struct HeldTo {
 
 /// A method is added by a line here.
 const HELD_TO: &[HeldTo] = &[
-    HeldTo { method: Method::MassSpring, rest: 1e-6, rigid_motion: 1e-6, patch: None, bar: 0.25, cantilever: None, frequency: 0.15, stretch: None },
-    HeldTo { method: Method::XpbdSprings, rest: 1e-6, rigid_motion: 1e-6, patch: None, bar: 0.25, cantilever: None, frequency: 0.15, stretch: None },
-    HeldTo { method: Method::XpbdNeoHookean, rest: 1e-6, rigid_motion: 1e-6, patch: Some(1e-3), bar: 0.02, cantilever: Some(0.03), frequency: 0.01, stretch: Some(0.01) },
+    HeldTo {
+        method: Method::MassSpring,
+        rest: 1e-6,
+        rigid_motion: 1e-6,
+        patch: None,
+        bar: 0.25,
+        cantilever: None,
+        frequency: 0.15,
+        stretch: None,
+    },
+    HeldTo {
+        method: Method::XpbdSprings,
+        rest: 1e-6,
+        rigid_motion: 1e-6,
+        patch: None,
+        bar: 0.25,
+        cantilever: None,
+        frequency: 0.15,
+        stretch: None,
+    },
+    HeldTo {
+        method: Method::XpbdNeoHookean,
+        rest: 1e-6,
+        rigid_motion: 1e-6,
+        patch: Some(1e-3),
+        bar: 0.02,
+        cantilever: Some(0.03),
+        frequency: 0.01,
+        stretch: Some(0.01),
+    },
 ];
 
 /// Who solves a case.
@@ -76,10 +103,12 @@ impl Tissue {
 impl Solver {
     /// The reference, and every method for which `held_to` has a limit, with that limit.
     fn all(reference: f64, held_to: impl Fn(&HeldTo) -> Option<f64>) -> Vec<(Self, f64)> {
-        let methods = HELD_TO.iter().filter_map(|held| {
-            held_to(held).map(|limit| (Self::Method(held.method), limit))
-        });
-        std::iter::once((Self::Reference, reference)).chain(methods).collect()
+        let methods = HELD_TO
+            .iter()
+            .filter_map(|held| held_to(held).map(|limit| (Self::Method(held.method), limit)));
+        std::iter::once((Self::Reference, reference))
+            .chain(methods)
+            .collect()
     }
 
     /// Poisson's ratio 0, or the smallest that the model has: springs along edges have 1/4.
@@ -91,7 +120,13 @@ impl Solver {
     }
 
     /// Positions at which `setup` comes to rest [m], its held particles where `held` has them.
-    fn settle(self, setup: &BodySetup, tissue: Tissue, held: &[DVec3], frames: usize) -> Vec<DVec3> {
+    fn settle(
+        self,
+        setup: &BodySetup,
+        tissue: Tissue,
+        held: &[DVec3],
+        frames: usize,
+    ) -> Vec<DVec3> {
         match self {
             Self::Reference => {
                 let mut fem = fem(setup, tissue.material());
@@ -128,7 +163,10 @@ fn assert_all(case: &str, solvers: &[(Solver, f64)], error: impl Fn(Solver) -> f
     }
     for ((solver, limit), error) in solvers.iter().zip(&errors) {
         // NaN is not below.
-        assert!(error < limit, "{case}, {solver:?}: {error} is not below {limit}");
+        assert!(
+            error < limit,
+            "{case}, {solver:?}: {error} is not below {limit}"
+        );
     }
 }
 
@@ -141,12 +179,22 @@ fn crooked_body() -> BodySetup {
     let size_m = Vec3::new(0.04, 0.03, 0.03);
     let mut setup = block(size_m, [4, 3, 3], |_| false);
     shake_inside(&mut setup, size_m, 2e-3);
-    placed(&setup, Quat::from_scaled_axis(Vec3::new(0.4, -0.9, 0.3)), Vec3::new(0.013, -0.027, 0.031))
+    placed(
+        &setup,
+        Quat::from_scaled_axis(Vec3::new(0.4, -0.9, 0.3)),
+        Vec3::new(0.013, -0.027, 0.031),
+    )
 }
 
 /// How far `method` moves the body from `start` in so many steps that it is kept awake, over its length.
 fn drift(method: Method, setup: &BodySetup, start: &[DVec3], steps: usize) -> f64 {
-    let mut simulation = Simulation::new(setup.clone(), SolverParams { method, ..SolverParams::default() });
+    let mut simulation = Simulation::new(
+        setup.clone(),
+        SolverParams {
+            method,
+            ..SolverParams::default()
+        },
+    );
     let start: Vec<Vec3> = start.iter().map(|x| x.as_vec3()).collect();
     simulation.set_state(&start, &vec![Vec3::ZERO; start.len()]);
     let before = positions(&simulation);
@@ -191,9 +239,17 @@ fn turned(setup: &BodySetup, stretch: f64) -> Vec<DVec3> {
 fn body_turned_and_shifted_is_as_much_at_rest_as_before() {
     let setup = crooked_body();
     let fem = fem(&setup, Material::new(5e3, 0.45));
-    let force = |x: &[DVec3]| fem.elastic_forces_n(x).iter().map(|f| f.length()).fold(0.0, f64::max);
+    let force = |x: &[DVec3]| {
+        fem.elastic_forces_n(x)
+            .iter()
+            .map(|f| f.length())
+            .fold(0.0, f64::max)
+    };
     let (still, strained) = (force(&turned(&setup, 1.0)), force(&turned(&setup, 1.001)));
-    println!("rigid motion, Reference: {:.1e} of the forces of 0.1 % strain", still / strained);
+    println!(
+        "rigid motion, Reference: {:.1e} of the forces of 0.1 % strain",
+        still / strained
+    );
     assert!(still < 1e-10 * strained);
     for held in HELD_TO {
         let moved = drift(held.method, &setup, &turned(&setup, 1.0), 300);
@@ -205,7 +261,12 @@ fn body_turned_and_shifted_is_as_much_at_rest_as_before() {
 #[test]
 fn rigid_motion_check_sees_a_strain_of_a_hundred_thousandth() {
     let setup = crooked_body();
-    let moved = drift(Method::XpbdNeoHookean, &setup, &turned(&setup, 1.00001), 300);
+    let moved = drift(
+        Method::XpbdNeoHookean,
+        &setup,
+        &turned(&setup, 1.00001),
+        300,
+    );
     assert!(moved > 1e-6, "{moved}");
 }
 
@@ -233,9 +294,18 @@ fn patch_error(solver: Solver, half: f32) -> f64 {
     let moved = farthest_m(&exact, &rest_of(&setup));
     // Inner particles start off their place; held ones are there.
     let start: Vec<DVec3> = (exact.iter().enumerate())
-        .map(|(i, x)| *x + if setup.fixed[i] { DVec3::ZERO } else { 1e-3 * scatter(i).as_dvec3() })
+        .map(|(i, x)| {
+            *x + if setup.fixed[i] {
+                DVec3::ZERO
+            } else {
+                1e-3 * scatter(i).as_dvec3()
+            }
+        })
         .collect();
-    let tissue = Tissue { youngs_modulus_pa: 1e4, poisson_ratio: 0.4 };
+    let tissue = Tissue {
+        youngs_modulus_pa: 1e4,
+        poisson_ratio: 0.4,
+    };
     farthest_m(&solver.settle(&setup, tissue, &start, 60), &exact) / moved
 }
 
@@ -264,7 +334,11 @@ fn bar(cells: [usize; 3]) -> BodySetup {
 /// Mean displacement of the end x = `length_m` along `axis` [m].
 fn end_m(setup: &BodySetup, positions: &[DVec3], length_m: f32, axis: usize) -> f64 {
     let rest = &setup.tets.particles;
-    mean_where(setup, |x| x.x > 0.9999 * length_m, |i| positions[i][axis] - f64::from(rest[i][axis]))
+    mean_where(
+        setup,
+        |x| x.x > 0.9999 * length_m,
+        |i| positions[i][axis] - f64::from(rest[i][axis]),
+    )
 }
 
 /// Relative error of the lengthening, with a modulus so many times the right one.
@@ -273,9 +347,23 @@ fn bar_error(solver: Solver, modulus_factor: f64) -> f64 {
     setup.gravity_m_s2 = Vec3::new(9.81, 0.0, 0.0);
     setup.damping_per_s = 60.0;
     // Lengthens by about 1 %.
-    let tissue = Tissue { youngs_modulus_pa: 49e3, poisson_ratio: solver.smallest_poisson_ratio() };
-    let exact = hanging_bar_m(Tissue { poisson_ratio: 0.0, ..tissue }.material(), 0.1, 981.0);
-    let used = Tissue { youngs_modulus_pa: modulus_factor * tissue.youngs_modulus_pa, ..tissue };
+    let tissue = Tissue {
+        youngs_modulus_pa: 49e3,
+        poisson_ratio: solver.smallest_poisson_ratio(),
+    };
+    let exact = hanging_bar_m(
+        Tissue {
+            poisson_ratio: 0.0,
+            ..tissue
+        }
+        .material(),
+        0.1,
+        981.0,
+    );
+    let used = Tissue {
+        youngs_modulus_pa: modulus_factor * tissue.youngs_modulus_pa,
+        ..tissue
+    };
     let found = solver.settle(&setup, used, &rest_of(&setup), 90);
     (end_m(&setup, &found, 0.1, 0) / exact - 1.0).abs()
 }
@@ -291,7 +379,10 @@ fn closed_form_of_the_bar_is_linear_for_a_small_weight() {
     let (e, length) = (1e4, 0.1);
     let small = hanging_bar_m(Material::new(e, 0.0), length, 1e-3 * e);
     // The next order is 1e-3 of this one.
-    assert!((small / (1e-3 * length / 2.0) - 1.0).abs() < 2e-3, "{small}");
+    assert!(
+        (small / (1e-3 * length / 2.0) - 1.0).abs() < 2e-3,
+        "{small}"
+    );
 }
 
 #[test]
@@ -320,9 +411,15 @@ fn extrapolated(coarse: f64, fine: f64) -> f64 {
 
 fn cantilever_error(solver: Solver, modulus_factor: f64) -> f64 {
     // Sags by about 2 % of its length.
-    let tissue = Tissue { youngs_modulus_pa: 18e6 , poisson_ratio: 0.0 };
+    let tissue = Tissue {
+        youngs_modulus_pa: 18e6,
+        poisson_ratio: 0.0,
+    };
     let exact = cantilever_m(tissue.youngs_modulus_pa, 1.0, 0.2, 9810.0);
-    let used = Tissue { youngs_modulus_pa: modulus_factor * tissue.youngs_modulus_pa, ..tissue };
+    let used = Tissue {
+        youngs_modulus_pa: modulus_factor * tissue.youngs_modulus_pa,
+        ..tissue
+    };
     let sags: Vec<f64> = [[10, 2, 2], [20, 4, 4]]
         .into_iter()
         .map(|cells| cantilever_sag_m(solver, used, cells))
@@ -334,12 +431,17 @@ fn cantilever_error(solver: Solver, modulus_factor: f64) -> f64 {
 #[test]
 fn cantilever_sags_by_timoshenko() {
     let solvers = Solver::all(0.01, |held| held.cantilever);
-    assert_all("cantilever", &solvers, |solver| cantilever_error(solver, 1.0));
+    assert_all("cantilever", &solvers, |solver| {
+        cantilever_error(solver, 1.0)
+    });
 }
 
 #[test]
 fn cantilever_sag_converges_with_second_order() {
-    let tissue = Tissue { youngs_modulus_pa: 18e6, poisson_ratio: 0.0 };
+    let tissue = Tissue {
+        youngs_modulus_pa: 18e6,
+        poisson_ratio: 0.0,
+    };
     let sag = |n: usize| cantilever_sag_m(Solver::Reference, tissue, [5 * n, n, n]);
     let sags = [sag(2), sag(4), sag(8)];
     let ratio = (sags[1] - sags[0]) / (sags[2] - sags[1]);
@@ -363,19 +465,34 @@ const SAMPLES_PER_S: f64 = 240.0;
 /// Displacement along the lowest axial mode, sampled.
 fn mode_samples(solver: Solver, setup: &BodySetup, tissue: Tissue, samples: usize) -> Vec<f64> {
     let rest = rest_of(setup);
-    let start: Vec<DVec3> = rest.iter().map(|x| *x + 5e-4 * bar_mode(x.x, 0.1) * DVec3::X).collect();
+    let start: Vec<DVec3> = rest
+        .iter()
+        .map(|x| *x + 5e-4 * bar_mode(x.x, 0.1) * DVec3::X)
+        .collect();
     let amplitude = |x: &[DVec3]| -> f64 {
         (0..rest.len())
-            .map(|i| f64::from(setup.masses_kg[i]) * (x[i].x - rest[i].x) * bar_mode(rest[i].x, 0.1))
+            .map(|i| {
+                f64::from(setup.masses_kg[i]) * (x[i].x - rest[i].x) * bar_mode(rest[i].x, 0.1)
+            })
             .sum()
     };
     let mut found = vec![amplitude(&start)];
     match solver {
         Solver::Reference => {
             let fem = fem(setup, tissue.material());
-            let swing = Swing { frames: samples, frame_s: 1.0 / SAMPLES_PER_S, steps_per_frame: 2, damping_per_s: 0.0 };
-            let start = State { velocities: vec![DVec3::ZERO; start.len()], positions: start };
-            fem.swing(start, &swing, |_, state| found.push(amplitude(&state.positions)));
+            let swing = Swing {
+                frames: samples,
+                frame_s: 1.0 / SAMPLES_PER_S,
+                steps_per_frame: 2,
+                damping_per_s: 0.0,
+            };
+            let start = State {
+                velocities: vec![DVec3::ZERO; start.len()],
+                positions: start,
+            };
+            fem.swing(start, &swing, |_, state| {
+                found.push(amplitude(&state.positions))
+            });
         }
         Solver::Method(method) => {
             let params = SolverParams {
@@ -406,9 +523,15 @@ fn frequency_hz(samples: &[f64]) -> f64 {
 }
 
 fn frequency_error(solver: Solver, modulus_factor: f64) -> f64 {
-    let tissue = Tissue { youngs_modulus_pa: 1e4, poisson_ratio: solver.smallest_poisson_ratio() };
+    let tissue = Tissue {
+        youngs_modulus_pa: 1e4,
+        poisson_ratio: solver.smallest_poisson_ratio(),
+    };
     let exact = bar_frequency_hz(tissue.youngs_modulus_pa, f64::from(DENSITY_KG_M3), 0.1);
-    let used = Tissue { youngs_modulus_pa: modulus_factor * tissue.youngs_modulus_pa, ..tissue };
+    let used = Tissue {
+        youngs_modulus_pa: modulus_factor * tissue.youngs_modulus_pa,
+        ..tissue
+    };
     let samples = mode_samples(solver, &bar([10, 2, 2]), used, 120);
     (frequency_hz(&samples) / exact - 1.0).abs()
 }
@@ -429,18 +552,30 @@ fn frequency_check_rejects_a_modulus_five_per_cent_off() {
 
 // ------------------------------------------------------------------------------------ uniaxial stretch
 
-const INCOMPRESSIBLE: Tissue = Tissue { youngs_modulus_pa: 1e4, poisson_ratio: 0.45 };
+const INCOMPRESSIBLE: Tissue = Tissue {
+    youngs_modulus_pa: 1e4,
+    poisson_ratio: 0.45,
+};
 
 /// Error of the lateral stretch in the middle of a long bar that is pulled to 1.4 times its length by its ends,
 /// which keep their size, over 1 less it.
 fn stretch_error(solver: Solver, poisson_ratio: f64) -> f64 {
-    let mut setup = block(Vec3::new(0.16, 0.02, 0.02), [16, 2, 2], |x| x.x < 1e-6 || x.x > 0.1599);
+    let mut setup = block(Vec3::new(0.16, 0.02, 0.02), [16, 2, 2], |x| {
+        x.x < 1e-6 || x.x > 0.1599
+    });
     setup.damping_per_s = 10.0;
-    let start: Vec<DVec3> = rest_of(&setup).iter().map(|x| DVec3::new(1.4, 1.0, 1.0) * *x).collect();
-    let tissue = Tissue { poisson_ratio, ..INCOMPRESSIBLE };
+    let start: Vec<DVec3> = rest_of(&setup)
+        .iter()
+        .map(|x| DVec3::new(1.4, 1.0, 1.0) * *x)
+        .collect();
+    let tissue = Tissue {
+        poisson_ratio,
+        ..INCOMPRESSIBLE
+    };
     let found = solver.settle(&setup, tissue, &start, 120);
     let plane = |at: f32| move |x: Vec3| (x.x - at).abs() < 1e-4;
-    let axial = mean_where(&setup, plane(0.1), |i| found[i].x) - mean_where(&setup, plane(0.06), |i| found[i].x);
+    let axial = mean_where(&setup, plane(0.1), |i| found[i].x)
+        - mean_where(&setup, plane(0.06), |i| found[i].x);
     // Width over four planes, of particles at opposite sides.
     let side = |y: f32| {
         mean_where(
@@ -451,14 +586,19 @@ fn stretch_error(solver: Solver, poisson_ratio: f64) -> f64 {
     };
     let lateral = (side(0.02) - side(0.0)) / 0.02;
     let exact = uniaxial(INCOMPRESSIBLE.material(), axial / 0.04).0;
-    println!("{solver:?} axial {} lateral {lateral} exact {exact}", axial / 0.04);
+    println!(
+        "{solver:?} axial {} lateral {lateral} exact {exact}",
+        axial / 0.04
+    );
     ((lateral - exact) / (1.0 - exact)).abs()
 }
 
 #[test]
 fn pulled_bar_narrows_by_the_closed_form() {
     let solvers = Solver::all(1e-3, |held| held.stretch);
-    assert_all("uniaxial stretch", &solvers, |solver| stretch_error(solver, 0.45));
+    assert_all("uniaxial stretch", &solvers, |solver| {
+        stretch_error(solver, 0.45)
+    });
 }
 
 #[test]
@@ -474,11 +614,16 @@ fn stretch_check_rejects_a_poisson_ratio_five_per_cent_off() {
 fn stretch_force_error(modulus_factor: f64) -> f64 {
     let stretch = 1.5;
     let (lateral, stress_pa) = uniaxial(INCOMPRESSIBLE.material(), stretch);
-    let setup = block(Vec3::new(0.08, 0.02, 0.02), [8, 2, 2], |x| x.x < 1e-6 || x.x > 0.0799);
+    let setup = block(Vec3::new(0.08, 0.02, 0.02), [8, 2, 2], |x| {
+        x.x < 1e-6 || x.x > 0.0799
+    });
     let places: Vec<DVec3> = (rest_of(&setup).iter())
         .map(|x| DVec3::new(stretch, lateral, lateral) * *x)
         .collect();
-    let used = Tissue { youngs_modulus_pa: modulus_factor * INCOMPRESSIBLE.youngs_modulus_pa, ..INCOMPRESSIBLE };
+    let used = Tissue {
+        youngs_modulus_pa: modulus_factor * INCOMPRESSIBLE.youngs_modulus_pa,
+        ..INCOMPRESSIBLE
+    };
     let mut fem = fem(&setup, used.material());
     hold(&mut fem, &setup, &places);
     let found = fem.statics().expect("it settles").positions;
