@@ -35,6 +35,9 @@ pub struct Step {
 /// Weight of the isotropic part of the local stiffness, in shear moduli (see `neo_hookean`).
 pub const STIFFNESS_IN_MU: f32 = 2.0;
 
+/// Share of its own response that a tetrahedron counts on (θ in `neo_hookean`).
+pub const OWN_RESPONSE: f32 = 0.85;
+
 /// A tetrahedron whose ‖F‖² (3 at rest) is outside of these is crushed or torn long.
 const SQUARED_MIN: f32 = 1.0;
 const SQUARED_MAX: f32 = 12.0;
@@ -139,7 +142,7 @@ impl Batch {
         let corners = self.gather::<WIDE>(particles);
         let Deformation { f, cofactor, j } = self.deformation(&corners);
         let volumetric = (j - Lanes::splat(1.0)).times(step.bulk_pa) - Lanes::splat(step.mu_pa);
-        let k = self.volume_m3.times(step.h2_s2);
+        let k = self.volume_m3.times(OWN_RESPONSE * step.h2_s2);
         let bulk = k.times(step.bulk_pa);
         let shear = k.times(STIFFNESS_IN_MU * step.mu_pa);
 
@@ -172,7 +175,7 @@ impl Batch {
         let [sound_a, sound_b, sound_c] = edges(&self.gather::<WIDE>(sound));
         let change = self.gradient([a - sound_a, b - sound_b, c - sound_c]);
         let stiffness = STIFFNESS_IN_MU * step.mu_pa;
-        let shear = self.volume_m3.times(step.h2_s2 * stiffness);
+        let shear = self.volume_m3.times(OWN_RESPONSE * step.h2_s2 * stiffness);
         let mut rest = [Lanes3::default(); 3];
         for i in 0..3 {
             rest[i] = change[i].times(stiffness) - self.stress[i];

@@ -79,7 +79,8 @@ fn projected(mesh: &TetMesh, tet: usize, places: &[Vec4], params: &SolverParams)
         unit[column] = 1.0;
         let moved = DMat3::from_cols_array(&unit) * mobility;
         let stress = moved * shear + cofactor * (bulk * inner(cofactor, moved));
-        f64::from(u8::from(row == column)) + h2v * stress.to_cols_array()[row]
+        f64::from(u8::from(row == column))
+            + f64::from(OWN_RESPONSE) * h2v * stress.to_cols_array()[row]
     });
     let misfit = nalgebra::SVector::<f64, 9>::from_row_slice(
         &constraint::stress_pa(f, lame).to_cols_array(),
