@@ -1,10 +1,13 @@
 //! Bodies that studies measure: tetrahedra held at one end, with a tip that is watched.
 
-use crate::geom::lattice::{block_of_cells, boundary_triangles};
+use crate::geom::lattice::block_of_cells;
+use crate::geom::specimen::ellipsoid;
+use crate::geom::tet::{lumped_masses_kg, skin};
 use crate::geom::{Embedding, TetMesh, bounds};
 use crate::sim::BodySetup;
 use crate::sim::diagnose::tet_volume_m3;
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
 /// Standard gravity, downwards [m/s²].
 pub const GRAVITY_M_S2: Vec3 = Vec3::new(0.0, 0.0, -9.81);
@@ -18,7 +21,8 @@ const END_SHARE: f32 = 1e-6;
 const FOOT_SHARE: f32 = 0.15;
 
 /// Where a body is held.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Hold {
     /// At its smallest x, so that it hangs out along x; its tip is its largest x.
     End,
@@ -52,18 +56,18 @@ impl HeldBody {
             Hold::End => particles[*i].x >= high.x - near,
             Hold::Foot => particles[*i].z >= high.z - near,
         };
-        let (triangles, carriers) = skin(&tets);
+        let skin = skin(&tets);
         Self {
             tip: (0..particles.len()).filter(is_tip).collect(),
             size_m: f64::from(size_m),
             setup: BodySetup {
-                masses_kg: masses_kg(&tets, density_kg_m3),
+                masses_kg: lumped_masses_kg(&tets, density_kg_m3),
                 fixed: fixed.collect(),
                 fill: Vec::new(),
-                triangles,
+                triangles: skin.triangles,
                 embedding: Embedding {
-                    particles: carriers.iter().map(|&carrier| [carrier; 4]).collect(),
-                    weights: vec![[1.0, 0.0, 0.0, 0.0]; carriers.len()],
+                    particles: skin.particles.iter().map(|&i| [i; 4]).collect(),
+                    weights: vec![[1.0, 0.0, 0.0, 0.0]; skin.particles.len()],
                 },
                 gravity_m_s2: GRAVITY_M_S2,
                 damping_per_s: 0.0,
@@ -128,18 +132,8 @@ pub fn beam(cells_across: u32) -> TetMesh {
 
 /// An ellipsoid of 12 × 8 × 6 cm from a cube of n³ cells blown up to a ball: 5 n³ tetrahedra, poor
 /// ones where the edges of the cube were.
-///
-/// Source: Nowell, "Mapping a Cube to a Sphere", 2005.
-pub fn organ(cells: u32) -> TetMesh {
-    let mut tets = block_of_cells(Vec3::splat(2.0), [cells as usize; 3]).1.tets;
-    for particle in &mut tets.particles {
-        let x = particle.as_dvec3() - 1.0;
-        let s = x * x;
-        let shrunk = |a: f64, b: f64| (1.0 - 0.5 * (a + b) + a * b / 3.0).sqrt();
-        let ball = x * DVec3::new(shrunk(s.y, s.z), shrunk(s.z, s.x), shrunk(s.x, s.y));
-        *particle = (ORGAN_M * ball).as_vec3();
-    }
-    tets
+pub fn organ(cells: usize) -> TetMesh {
+    ellipsoid(ORGAN_M, cells)
 }
 
 /// `tets` in another size.
@@ -186,33 +180,6 @@ pub fn with_sliver(mut tets: TetMesh, ratio: f32) -> TetMesh {
         }
     }
     panic!("one of the tetrahedra round a particle inside can be flattened");
-}
-
-/// Masses [kg]: a quarter of each tetrahedron's mass a corner.
-fn masses_kg(tets: &TetMesh, density_kg_m3: f32) -> Vec<f32> {
-    let mut masses = vec![0.0_f64; tets.particles.len()];
-    for &tet in &tets.tets {
-        let quarter = f64::from(density_kg_m3) * tet_volume_m3(&tets.particles, tet) / 4.0;
-        tet.into_iter()
-            .for_each(|corner| masses[corner as usize] += quarter);
-    }
-    masses.into_iter().map(|mass| mass as f32).collect()
-}
-
-/// The skin of a mesh: triangles between points, and the particle of each point.
-fn skin(tets: &TetMesh) -> (Vec<[u32; 3]>, Vec<u32>) {
-    let mut triangles = boundary_triangles(tets);
-    let mut carriers: Vec<u32> = triangles.iter().flatten().copied().collect();
-    carriers.sort_unstable();
-    carriers.dedup();
-    let mut point_of = vec![0; tets.particles.len()];
-    for (point, &carrier) in carriers.iter().enumerate() {
-        point_of[carrier as usize] = point as u32;
-    }
-    for corner in triangles.iter_mut().flatten() {
-        *corner = point_of[*corner as usize];
-    }
-    (triangles, carriers)
 }
 
 #[cfg(test)]

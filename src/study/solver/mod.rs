@@ -16,6 +16,7 @@ use super::held_body::{HeldBody, Hold, beam};
 use super::oracle::{Motion, Oracle, Tissue};
 use super::sweep::{Row, Sweep};
 use crate::app::AppError;
+use crate::geom::import::read_tets;
 use crate::sim::{Method, SolverParams};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -26,8 +27,8 @@ use std::sync::{Arc, Mutex};
 const SWEEPS_MAX: u32 = 40;
 /// Cells across the beam from which on only a few settings are measured, and the statics only.
 const LARGE_ACROSS: u32 = 14;
-/// The same, up to which the whole swing is followed by the oracle.
-const SWING_ACROSS_MAX: u32 = 6;
+/// Bodies of so many tetrahedra are followed by the oracle through the whole swing; it takes minutes.
+const SWING_TETS_MAX: usize = 2500;
 
 /// What is swept.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,6 +44,11 @@ pub struct Plan {
 pub struct BodyPlan {
     /// Lattice cells across the beam: 5, 10 and 17 give 1k, 10k and 50k tetrahedra.
     pub cells_across: Vec<u32>,
+    /// Instead of the beams, the tetrahedra of a Gmsh file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<PathBuf>,
+    /// Where the body is held.
+    pub hold: Hold,
     pub density_kg_m3: f64,
 }
 
@@ -58,13 +64,14 @@ pub struct SolverPlan {
     pub timestep_s: f64,
 }
 
-/// One setting on one beam.
+/// One setting on one body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
     pub method: Method,
     pub mesh: String,
-    /// Of the beam.
-    pub cells_across: u32,
+    /// Of a beam; null for a file.
+    pub cells_across: Option<u32>,
+    pub hold: Hold,
     pub density_kg_m3: f64,
     pub youngs_modulus_pa: f64,
     pub poisson_ratio: f64,
@@ -93,12 +100,12 @@ impl Cell {
     }
 
     fn is_large(&self) -> bool {
-        self.cells_across >= LARGE_ACROSS
+        self.cells_across.is_some_and(|n| n >= LARGE_ACROSS)
     }
 
     /// How far the oracle follows the swing: a step of a 16th of a frame is converged.
-    fn motion(&self) -> Option<Motion> {
-        (self.cells_across <= SWING_ACROSS_MAX).then_some(Motion {
+    fn motion(&self, tets: usize) -> Option<Motion> {
+        (tets <= SWING_TETS_MAX).then_some(Motion {
             frames: measure::SWING_FRAMES,
             frame_s: self.timestep_s,
             steps_per_frame: 16,
@@ -117,6 +124,19 @@ impl Cell {
     }
 }
 
+/// The beams of a plan, or the body of its file: names and cells across.
+fn meshes(body: &BodyPlan) -> Vec<(String, Option<u32>)> {
+    match &body.file {
+        Some(file) => {
+            let stem = file.file_stem().unwrap_or(file.as_os_str());
+            vec![(stem.to_string_lossy().into_owned(), None)]
+        }
+        None => (body.cells_across.iter())
+            .map(|&n| (mesh_name(n), Some(n)))
+            .collect(),
+    }
+}
+
 /// `1250` as `1k`.
 fn mesh_name(cells_across: u32) -> String {
     match cells_across {
@@ -132,7 +152,9 @@ fn mesh_name(cells_across: u32) -> String {
 pub struct Solver {
     out: PathBuf,
     threads: usize,
-    bodies: Shared<u32, HeldBody>,
+    /// Of the plan, for all cells.
+    file: Option<PathBuf>,
+    bodies: Shared<String, HeldBody>,
     oracles: Shared<String, Oracle>,
     limits: Shared<String, Option<f64>>,
 }
@@ -153,6 +175,8 @@ impl Sweep for Solver {
         Plan {
             body: BodyPlan {
                 cells_across: pick(&[5, 10, 17], &[5]),
+                file: None,
+                hold: Hold::End,
                 density_kg_m3: 1000.0,
             },
             solver: SolverPlan {
@@ -180,15 +204,16 @@ impl Sweep for Solver {
             ));
         }
         let mut cells = Vec::new();
-        for &cells_across in &body.cells_across {
+        for (mesh, cells_across) in meshes(body) {
             for &youngs_modulus_pa in &solver.youngs_modulus_pa {
                 for &method in &solver.method {
                     for &substeps in &solver.substeps {
                         for &iterations in &solver.iterations {
                             cells.push(Cell {
                                 method,
-                                mesh: mesh_name(cells_across),
+                                mesh: mesh.clone(),
                                 cells_across,
+                                hold: body.hold,
                                 density_kg_m3: body.density_kg_m3,
                                 youngs_modulus_pa,
                                 poisson_ratio: solver.poisson_ratio,
@@ -210,8 +235,9 @@ impl Sweep for Solver {
         }
     }
 
-    fn new(_: &Plan, out: &Path, threads: usize) -> Result<Self, AppError> {
+    fn new(plan: &Plan, out: &Path, threads: usize) -> Result<Self, AppError> {
         Ok(Self {
+            file: plan.body.file.clone(),
             out: out.to_owned(),
             threads,
             bodies: Shared::default(),
@@ -221,17 +247,12 @@ impl Sweep for Solver {
     }
 
     fn measure(&self, cell: &Cell) -> Result<Row<Cell, Measures>, AppError> {
-        let body = shared(&self.bodies, cell.cells_across, || {
-            Ok(HeldBody::new(
-                beam(cell.cells_across),
-                cell.density_kg_m3 as f32,
-                Hold::End,
-            ))
-        })?;
+        let body = shared(&self.bodies, cell.mesh.clone(), || self.body(cell))?;
         let tissue = format!("{}-{:.0}pa", cell.mesh, cell.youngs_modulus_pa);
         let oracle = shared(&self.oracles, tissue.clone(), || {
             let file = self.out.join(format!("oracle-{tissue}.json"));
-            Oracle::kept(&file, &body, cell.tissue(), cell.motion())
+            let motion = cell.motion(body.setup.tets.tets.len());
+            Oracle::kept(&file, &body, cell.tissue(), motion)
         })?;
         let limit = shared(
             &self.limits,
@@ -246,6 +267,31 @@ impl Sweep for Solver {
 
     fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
         show::findings(rows)
+    }
+}
+
+impl Solver {
+    fn body(&self, cell: &Cell) -> Result<HeldBody, AppError> {
+        let tets = match (&self.file, cell.cells_across) {
+            (None, Some(cells_across)) => beam(cells_across),
+            (Some(file), _) => {
+                let imported = read_tets(file)?;
+                for note in imported.notes {
+                    eprintln!("{}: {note}", file.display());
+                }
+                imported.mesh
+            }
+            (None, None) => unreachable!("a plan without a file has beams"),
+        };
+        let body = HeldBody::new(tets, cell.density_kg_m3 as f32, cell.hold);
+        let refuse = |problem: &str| Err(AppError::Body(format!("{}: {problem}", cell.mesh)));
+        if !body.setup.masses_kg.iter().all(|mass| mass.is_normal()) {
+            return refuse("a tetrahedron is too small to weigh anything as a number");
+        }
+        if body.free().next().is_none() {
+            return refuse("every particle is held: set body.hold to \"end\" or \"foot\"");
+        }
+        Ok(body)
     }
 }
 
