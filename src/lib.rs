@@ -9,6 +9,7 @@
 //! * [`passes`]: one GPU pass a file, and the order of a frame.
 //! * [`measure`]: percentiles, the frame log, charts and the report.
 //! * [`app`]: a session, the replay and the window.
+//! * [`study`]: sweeps that chart speed against accuracy.
 //!
 //! `docs/ARCHITECTURE.md` draws the map; `tests/architecture.rs` keeps it true.
 
@@ -21,3 +22,4 @@ pub mod passes;
 pub mod reference;
 pub mod scene;
 pub mod sim;
+pub mod study;

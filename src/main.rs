@@ -1,7 +1,9 @@
 //! The command line: parses it, calls the application, prints errors.
 
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
 use palpate::app::{self, AppError, Outcome, ReplayOptions, WindowOptions};
+use palpate::study::{self, Shard, Study, StudyOptions};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -20,6 +22,7 @@ Examples:
   palpate                                     prod the default organ with the mouse
   palpate replay liver --out out              run its script, write pictures, log and report
   palpate replay liver --set body.file='\"spleen.glb\"' --set surface.kind=gooey
+  palpate study solver --quick                time against error of every method, in a minute
   palpate check spleen.glb my-scene.toml      say what a file holds, or what is wrong with it
 
 Exit status: 0 done; 1 a comparison failed; 2 bad usage or bad input.";
@@ -42,6 +45,8 @@ enum Command {
     },
     /// Runs a scene's script without a window and writes pictures, log, states and a report.
     Replay(Replay),
+    /// Charts speed against accuracy: prints a table, writes NAME.csv, NAME.json, NAME.svg and a report.
+    Study(StudyArguments),
     /// Reads scenes, meshes and pictures; says what they hold or what is wrong.
     Check {
         /// Files to read.
@@ -89,6 +94,45 @@ struct Replay {
     against: Option<PathBuf>,
     #[command(flatten)]
     sets: Sets,
+}
+
+/// A study goes on where an interrupted run with the same settings stopped.
+#[derive(Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+struct StudyArguments {
+    #[command(subcommand)]
+    command: Option<StudyCommand>,
+    /// Which study.
+    #[arg(value_parser = PossibleValuesParser::new(Study::ALL.map(Study::name)), required = true)]
+    name: Option<String>,
+    /// Folder for everything that is written [default: out/study, or out/study-I-of-N].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// A few settings, in less than a minute.
+    #[arg(long)]
+    quick: bool,
+    /// Only part I of N, counted from 1: every Nth cell. `palpate study merge` joins the parts.
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Replaces one value of the study's plan, or a list by a list or a single value, such as
+    /// solver.substeps=20 or solver.substeps=[10,20]; repeatable.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Threads to use; no result but the times depends on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    threads: Option<u32>,
+}
+
+#[derive(Subcommand)]
+enum StudyCommand {
+    /// Joins the parts of a study, made with --shard, to the result of one run.
+    Merge {
+        /// Folder for the result.
+        out: PathBuf,
+        /// The folder of each part.
+        #[arg(required = true, value_name = "DIR")]
+        parts: Vec<PathBuf>,
+    },
 }
 
 /// `800x600` as width and height.
@@ -141,9 +185,25 @@ fn run(command: Option<Command>) -> Result<Outcome, AppError> {
             render: !replay.no_render,
             against: replay.against,
         }),
+        Some(Command::Study(arguments)) => run_study(arguments),
         Some(Command::Check { files }) => app::check(&files),
         Some(Command::Scenes) => app::list_scenes(),
     }
+}
+
+fn run_study(arguments: StudyArguments) -> Result<Outcome, AppError> {
+    if let Some(StudyCommand::Merge { out, parts }) = arguments.command {
+        return study::merge(&out, &parts);
+    }
+    let name = arguments.name.expect("the parser asks for a name");
+    study::study(&StudyOptions {
+        study: Study::named(&name).expect("the parser lets only known names through"),
+        out: arguments.out,
+        quick: arguments.quick,
+        shard: arguments.shard,
+        sets: arguments.set,
+        threads: app::thread_count(arguments.threads),
+    })
 }
 
 /// An error with the causes below it, on one line.

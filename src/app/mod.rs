@@ -20,6 +20,7 @@ mod window;
 pub use assets::DEFAULT_SCENE;
 pub use check::check;
 pub use error::AppError;
+pub use load::{LoadedBody, body as load_body, scene as load_scene};
 pub use record::start_clock;
 pub use replay::{ReplayOptions, replay};
 pub use session::{Marker, Session, Tick};
@@ -54,8 +55,8 @@ pub fn list_scenes() -> Result<Outcome, AppError> {
     Ok(Outcome::Done)
 }
 
-/// Threads to simulate with: as told, or as many as the machine has.
-fn thread_count(told: Option<u32>) -> usize {
+/// Threads to use: as told, or as many as the machine has.
+pub fn thread_count(told: Option<u32>) -> usize {
     told.map_or_else(
         || std::thread::available_parallelism().map_or(1, usize::from),
         |threads| threads as usize,

@@ -50,7 +50,7 @@ impl Specimen {
 
 /// An ellipsoid of these half axes [m] about the origin: a cube of `cells` cells a side, blown up to
 /// a ball and stretched.
-fn ellipsoid(half_axes_m: DVec3, cells: usize) -> TetMesh {
+pub fn ellipsoid(half_axes_m: DVec3, cells: usize) -> TetMesh {
     let mut mesh = block_of_cells(Vec3::splat(2.0), [cells; 3]).1.tets;
     for particle in &mut mesh.particles {
         *particle = (half_axes_m * ball_of_cube(particle.as_dvec3() - 1.0)).as_vec3();

@@ -6,10 +6,10 @@ use std::fmt::Write;
 pub const COLORS: [&str; 8] = [
     "#1f6f8b", "#e08e45", "#6a994e", "#9b4f96", "#8d99ae", "#c9a227", "#bc4749", "#3d5a80",
 ];
-const AXIS_COLOR: &str = "#8a8f98";
-const GRID_COLOR: &str = "#e4e6ea";
-const TEXT_COLOR: &str = "#3c4048";
-const MARK_COLOR: &str = "#b3261e";
+pub(super) const AXIS_COLOR: &str = "#8a8f98";
+pub(super) const GRID_COLOR: &str = "#e4e6ea";
+pub(super) const TEXT_COLOR: &str = "#3c4048";
+pub(super) const MARK_COLOR: &str = "#b3261e";
 const LEFT_PX: f64 = 58.0;
 const RIGHT_PX: f64 = 12.0;
 /// Room at the right for the names of levels.

@@ -159,15 +159,50 @@ fn figure(content: &str, caption: &str) -> String {
 }
 
 impl Table {
-    fn html(&self) -> String {
-        let is_number = |column: usize| {
-            let mut cells = self.rows.iter().filter_map(|row| row.get(column));
-            cells.all(|cell| {
-                cell.is_empty() || cell.starts_with(|c: char| c.is_ascii_digit() || c == '−')
+    /// The table as text, its columns lined up.
+    pub fn text(&self) -> String {
+        let lines: Vec<&Vec<String>> = std::iter::once(&self.head).chain(&self.rows).collect();
+        let cell =
+            |line: &[String], column: usize| line.get(column).map_or(0, |c| c.chars().count());
+        let columns = lines.iter().map(|line| line.len()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..columns)
+            .map(|column| {
+                lines
+                    .iter()
+                    .map(|line| cell(line, column))
+                    .max()
+                    .unwrap_or(0)
             })
-        };
+            .collect();
+        let mut text = String::new();
+        for line in lines.iter().filter(|line| !line.is_empty()) {
+            let cells = line.iter().zip(&widths).enumerate();
+            let cells: Vec<String> = cells
+                .map(|(column, (cell, &width))| {
+                    if self.holds_numbers(column) {
+                        format!("{cell:>width$}")
+                    } else {
+                        format!("{cell:<width$}")
+                    }
+                })
+                .collect();
+            text += cells.join("  ").trim_end();
+            text.push('\n');
+        }
+        text
+    }
+
+    /// Whether every cell of a column is a number or empty.
+    fn holds_numbers(&self, column: usize) -> bool {
+        let mut cells = self.rows.iter().filter_map(|row| row.get(column));
+        cells.all(|cell| {
+            cell.is_empty() || cell.starts_with(|c: char| c.is_ascii_digit() || c == '−')
+        })
+    }
+
+    fn html(&self) -> String {
         let class = |column: usize| {
-            if is_number(column) {
+            if self.holds_numbers(column) {
                 " class=\"number\""
             } else {
                 ""
@@ -212,6 +247,21 @@ mod tests {
         for outside in ["<script", "<link", "src=\"http", "url(http", "@import"] {
             assert!(!html.contains(outside), "{outside}");
         }
+    }
+
+    #[test]
+    fn text_of_a_table_lines_its_columns_up() {
+        let table = Table {
+            head: vec!["pass".to_owned(), "ms".to_owned()],
+            rows: vec![
+                vec!["refit".to_owned(), "1.5".to_owned()],
+                vec!["surface, µ".to_owned(), "12.0".to_owned()],
+            ],
+        };
+        assert_eq!(
+            table.text(),
+            "pass          ms\nrefit        1.5\nsurface, µ  12.0\n"
+        );
     }
 
     #[test]

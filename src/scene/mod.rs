@@ -9,7 +9,7 @@ mod camera;
 mod check;
 mod error;
 mod light;
-mod overrides;
+pub mod overrides;
 mod place;
 mod surface;
 mod tool;

@@ -52,7 +52,7 @@ fn from_here(file: &Path) -> PathBuf {
 }
 
 /// A TOML value, or the text itself where it is none: `surface.kind=gooey` is a string.
-fn parse(text: &str) -> Value {
+pub fn parse(text: &str) -> Value {
     format!("value = {text}")
         .parse::<Table>()
         .ok()
@@ -62,7 +62,11 @@ fn parse(text: &str) -> Value {
 }
 
 /// Puts `value` at the place that `steps` lead to; a number steps into a list.
-fn insert(place: &mut Value, steps: &[&str], value: Value) -> Result<(), String> {
+///
+/// # Errors
+///
+/// What is wrong with the path, with what is there.
+pub fn insert(place: &mut Value, steps: &[&str], value: Value) -> Result<(), String> {
     let Some((step, rest)) = steps.split_first() else {
         *place = value;
         return Ok(());

@@ -1,0 +1,386 @@
+//! One simulation: poke after poke at random places, each looked at when it is over.
+
+use super::super::random::Random;
+use super::super::sweep::{Cost, Row, State, Verdict, finite};
+use super::super::timing::{Clock, Times};
+use super::Cell;
+use crate::app::{AppError, LoadedBody};
+use crate::geom::ray::first_hit;
+use crate::measure::chart::number;
+use crate::sim::{Simulation, SolverParams, ToolAction, ToolInput, ToolShape};
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+
+/// Radius of the tool, as shares of the body's longest extent.
+const RADIUS_SHARES: [f32; 2] = [0.03, 0.08];
+/// How deep the front goes, as shares of the thickness there, and at most of the extent.
+const DEPTH_SHARES: [f32; 2] = [0.1, 0.35];
+const DEPTH_EXTENT_MAX: f32 = 0.12;
+/// Tissue thinner than this share of the extent is a border, not a place to poke.
+const THICKNESS_SHARE_MIN: f32 = 0.08;
+/// Between tool and tissue at the start, in radii.
+const GAP_RADII: f32 = 0.1;
+/// How far off the normal a poke may come: the tangent of 30°.
+const TILT_MAX: f32 = 0.58;
+/// Frames at the deepest place, and after the tool has left.
+const HOLD_FRAMES: u32 = 6;
+const AFTER_FRAMES: u32 = 40;
+/// A slow tool is withdrawn faster than it came [m/s].
+const WITHDRAWAL_MIN_M_S: f32 = 0.1;
+/// Places that are tried for one poke.
+const TRIES_MAX: u32 = 1000;
+const FRICTION: f32 = 0.3;
+/// Share of the thickness from which on a tool is inside: the goal, and what nobody would overlook.
+const PENETRATION_BOUNDS: [f64; 2] = [0.01, 0.1];
+
+/// What is measured of the pokes of a cell.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Measures {
+    pub tets: usize,
+    /// What the faults are found by.
+    pub oracle: String,
+    /// Pokes in which a particle was frozen because it was not finite.
+    pub not_finite: u32,
+    /// Pokes after which tetrahedra stay inverted.
+    pub lasting_inversions: u32,
+    /// Pokes in which the middle of the tool ended up inside the surface.
+    pub tunnelled: u32,
+    /// Pokes in which a surface point was deeper in the tool than 1 % of the thickness.
+    pub too_deep: u32,
+    /// Deepest surface point inside the tool, as a share of the thickness.
+    pub penetration_share_max: Option<f64>,
+    /// Inverted at any time, and at the end.
+    pub inverted_tets_max: usize,
+    pub inverted_tets: usize,
+    /// Largest force on the tool [N].
+    pub force_max_n: Option<f64>,
+    /// Fastest particle at the end [m/s].
+    pub speed_left_m_s: Option<f64>,
+}
+
+/// Where a poke comes from and how deep it goes.
+#[derive(Clone, Copy, Debug)]
+struct Poke {
+    radius_m: f32,
+    /// Middle of the tool before it touches.
+    from_m: Vec3,
+    /// Unit direction of its way.
+    direction: Vec3,
+    /// Length of its way.
+    way_m: f32,
+    thickness_m: f32,
+}
+
+/// Pokes the body of a cell.
+///
+/// # Errors
+///
+/// [`AppError::Body`] if the body has no place to poke.
+pub fn run(
+    cell: &Cell,
+    body: &LoadedBody,
+    params: SolverParams,
+) -> Result<Row<Cell, Measures>, AppError> {
+    let mut simulation = Simulation::new(body.setup.clone(), params);
+    // Cells are measured side by side, each on a thread.
+    simulation.set_threads(Some(1));
+    let mut random = Random::new(seed(cell));
+    let mut times = Times::default();
+    let mut measures = Measures {
+        tets: simulation.tet_count(),
+        oracle: "invariants".to_owned(),
+        ..Measures::default()
+    };
+    let places = Places::new(body, simulation.points());
+    for _ in 0..cell.pokes {
+        let poke = places.choose(&mut random).ok_or_else(|| {
+            AppError::Body(format!("{}: no place on it can be poked", cell.scene))
+        })?;
+        let frozen_before = simulation.report().frozen_particles;
+        let watched = poke_once(&mut simulation, &places, &poke, cell.speed_m_s, &mut times);
+        let report = simulation.report();
+        measures.not_finite += u32::from(report.frozen_particles > frozen_before);
+        measures.lasting_inversions += u32::from(report.inverted_tets > 0);
+        measures.tunnelled += u32::from(watched.tunnelled);
+        let share = f64::from(watched.penetration_m / poke.thickness_m);
+        measures.too_deep += u32::from(share > PENETRATION_BOUNDS[0]);
+        let deepest = measures.penetration_share_max.unwrap_or(0.0).max(share);
+        measures.penetration_share_max = finite(deepest);
+        measures.inverted_tets_max = measures.inverted_tets_max.max(watched.inverted_tets_max);
+        let force = measures
+            .force_max_n
+            .unwrap_or(0.0)
+            .max(f64::from(watched.force_max_n));
+        measures.force_max_n = finite(force);
+    }
+    let report = simulation.report();
+    measures.inverted_tets = report.inverted_tets;
+    measures.speed_left_m_s = finite(f64::from(report.speed_max_m_s));
+    let wall = times.wall();
+    Ok(Row {
+        cell: cell.clone(),
+        verdict: verdict(&measures),
+        measures,
+        cost: Cost {
+            ms_p50: wall.map(|(median, _)| median),
+            ms_p95: wall.map(|(_, p95)| p95),
+        },
+    })
+}
+
+/// Another one for every cell, and the same one wherever it is measured.
+fn seed(cell: &Cell) -> u64 {
+    // FNV-1a over what tells cells apart, except the method: all methods get the same pokes.
+    let text = format!("{} {} {}", cell.scene, cell.speed_m_s, cell.batch);
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
+}
+
+/// What happened during one poke.
+#[derive(Clone, Copy, Debug, Default)]
+struct Watched {
+    penetration_m: f32,
+    force_max_n: f32,
+    inverted_tets_max: usize,
+    tunnelled: bool,
+}
+
+fn poke_once(
+    simulation: &mut Simulation,
+    places: &Places,
+    poke: &Poke,
+    speed_m_s: f64,
+    times: &mut Times,
+) -> Watched {
+    let timestep_s = simulation.params().timestep_s;
+    let mut watched = Watched::default();
+    let mut step = |simulation: &mut Simulation, way_m: f32, action: ToolAction| {
+        let tool = ToolInput {
+            shape: ToolShape::Sphere {
+                radius_m: poke.radius_m,
+            },
+            position_m: poke.from_m + way_m * poke.direction,
+            action,
+            friction: FRICTION,
+        };
+        let clock = Clock::start();
+        let report = simulation.step(&[tool]);
+        times.add(clock);
+        watched.penetration_m = watched.penetration_m.max(report.penetration_max_m);
+        watched.force_max_n = watched.force_max_n.max(report.tool_forces_n[0].length());
+        watched.inverted_tets_max = watched.inverted_tets_max.max(report.inverted_tets);
+    };
+    let forward_m = speed_m_s as f32 * timestep_s;
+    let back_m = forward_m.max(WITHDRAWAL_MIN_M_S * timestep_s);
+    step(simulation, 0.0, ToolAction::Push);
+    for k in 1..=steps(poke.way_m, forward_m) {
+        step(
+            simulation,
+            (forward_m * k as f32).min(poke.way_m),
+            ToolAction::Push,
+        );
+    }
+    for _ in 0..HOLD_FRAMES {
+        step(simulation, poke.way_m, ToolAction::Push);
+    }
+    let middle = poke.from_m + poke.way_m * poke.direction;
+    let tunnelled = places.is_inside(simulation.points(), middle);
+    for k in 1..=steps(poke.way_m, back_m) {
+        step(
+            simulation,
+            (poke.way_m - back_m * k as f32).max(0.0),
+            ToolAction::Push,
+        );
+    }
+    for _ in 0..AFTER_FRAMES {
+        step(simulation, 0.0, ToolAction::Idle);
+    }
+    watched.tunnelled = tunnelled;
+    watched
+}
+
+fn steps(way_m: f32, step_m: f32) -> u32 {
+    (way_m / step_m).ceil().max(1.0) as u32
+}
+
+/// The surface at rest, where pokes are aimed.
+struct Places<'a> {
+    points: Vec<Vec3>,
+    triangles: &'a [[u32; 3]],
+    /// Triangles that nothing holds.
+    free: Vec<usize>,
+    extent_m: f32,
+}
+
+impl<'a> Places<'a> {
+    fn new(body: &'a LoadedBody, points: &[Vec3]) -> Self {
+        let setup = &body.setup;
+        let is_held = |point: u32| {
+            let carriers = setup.embedding.particles[point as usize];
+            carriers
+                .into_iter()
+                .any(|particle| setup.fixed[particle as usize])
+        };
+        let is_free = |triangle: &usize| !setup.triangles[*triangle].into_iter().any(is_held);
+        Self {
+            points: points.to_vec(),
+            triangles: &setup.triangles,
+            free: (0..setup.triangles.len()).filter(is_free).collect(),
+            extent_m: body.rest.longest_m(),
+        }
+    }
+
+    /// A poke at a random place; `None` if no place will do.
+    fn choose(&self, random: &mut Random) -> Option<Poke> {
+        (0..TRIES_MAX).find_map(|_| self.attempt(random))
+    }
+
+    fn attempt(&self, random: &mut Random) -> Option<Poke> {
+        if self.free.is_empty() {
+            return None;
+        }
+        let triangle = self.free[random.below(self.free.len())];
+        let [a, b, c] = self.triangles[triangle].map(|i| self.points[i as usize]);
+        let normal = (b - a).cross(c - a).try_normalize()?;
+        let tilt = TILT_MAX * random.in_box(Vec3::NEG_ONE, Vec3::ONE);
+        let direction = (tilt.reject_from_normalized(normal) - normal).normalize();
+        let touch = (a + b + c) / 3.0;
+        let radius_m = self.extent_m * random.between(RADIUS_SHARES[0], RADIUS_SHARES[1]);
+        let depth_share = random.between(DEPTH_SHARES[0], DEPTH_SHARES[1]);
+        let inside = touch + 1e-3 * self.extent_m * direction;
+        let thickness_m = first_hit(inside, direction, &self.points, self.triangles)?.distance;
+        let from_m = touch - (1.0 + GAP_RADII) * radius_m * direction;
+        let depth_m = (depth_share * thickness_m).min(DEPTH_EXTENT_MAX * self.extent_m);
+        let is_clear = self
+            .points
+            .iter()
+            .all(|point| point.distance(from_m) > radius_m);
+        let is_thick = thickness_m > THICKNESS_SHARE_MIN * self.extent_m;
+        (is_clear && is_thick).then_some(Poke {
+            radius_m,
+            from_m,
+            direction,
+            way_m: GAP_RADII * radius_m + depth_m,
+            thickness_m,
+        })
+    }
+
+    /// Whether `place` is inside the surface through `points`, by a vote of three directions.
+    fn is_inside(&self, points: &[Vec3], place: Vec3) -> bool {
+        let leaves = |direction: &Vec3| {
+            let hit = first_hit(place, *direction, points, self.triangles);
+            hit.is_some_and(|hit| hit.normal.dot(*direction) > 0.0)
+        };
+        // No direction along which a surface is likely to be aligned.
+        let directions = [
+            Vec3::new(0.61, 0.37, 0.70),
+            Vec3::new(-0.53, 0.81, -0.23),
+            Vec3::new(0.17, -0.44, 0.88),
+        ];
+        directions
+            .iter()
+            .filter(|direction| leaves(direction))
+            .count()
+            >= 2
+    }
+}
+
+fn verdict(m: &Measures) -> Verdict {
+    let mut faults = Vec::new();
+    let mut count = |pokes: u32, what: &str| {
+        if pokes > 0 {
+            faults.push((State::Failed, format!("{pokes} pokes {what}")));
+        }
+    };
+    count(m.not_finite, "not finite");
+    count(m.lasting_inversions, "left tetrahedra inverted");
+    count(m.tunnelled, "ended with the tool inside");
+    let share = m.penetration_share_max.unwrap_or(f64::INFINITY);
+    if share > PENETRATION_BOUNDS[0] {
+        let state = if share > PENETRATION_BOUNDS[1] {
+            State::Failed
+        } else {
+            State::Degraded
+        };
+        let why = format!(
+            "{} pokes with the tool deeper inside than 1 % of the thickness, {} % at most",
+            m.too_deep,
+            number(100.0 * share)
+        );
+        faults.push((state, why));
+    }
+    Verdict::of(faults)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::{load_body, load_scene};
+
+    fn slab() -> LoadedBody {
+        let mut scene = load_scene("slab", &[]).expect("it is bundled");
+        scene.body.cell_m = Some(0.25 * load_body(&scene).expect("sound").rest.longest_m());
+        load_body(&scene).expect("sound")
+    }
+
+    #[test]
+    fn pokes_come_from_outside_and_end_in_the_tissue_they_were_aimed_at() {
+        let body = slab();
+        let places = Places::new(&body, &body.mesh.points);
+        let mut random = Random::new(7);
+        for _ in 0..20 {
+            let poke = places.choose(&mut random).expect("a slab can be poked");
+            assert!(!places.is_inside(&places.points, poke.from_m));
+            let front = poke.from_m + (poke.way_m + poke.radius_m) * poke.direction;
+            assert!(places.is_inside(&places.points, front), "{poke:?}");
+            assert!((poke.direction.length() - 1.0).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn same_cell_gives_the_same_pokes_and_another_batch_gives_others() {
+        let cell = |batch| Cell {
+            scene: "slab".to_owned(),
+            cell_share: 0.25,
+            method: SolverParams::default().method,
+            speed_m_s: 1.0,
+            batch,
+            pokes: 2,
+        };
+        let body = slab();
+        let params = SolverParams::default();
+        let row = |batch| {
+            run(&cell(batch), &body, params)
+                .expect("it can be poked")
+                .measures
+        };
+        assert_eq!(row(0), row(0));
+        assert_ne!(row(0).force_max_n, row(1).force_max_n);
+        assert!(row(0).force_max_n.expect("finite") > 0.0);
+    }
+
+    #[test]
+    fn verdict_counts_what_must_not_happen() {
+        let fine = Measures {
+            penetration_share_max: Some(0.001),
+            ..Measures::default()
+        };
+        assert_eq!(verdict(&fine).state, State::Fine);
+        let torn = Measures {
+            lasting_inversions: 3,
+            ..fine.clone()
+        };
+        assert!(verdict(&torn).why.contains("3 pokes left"));
+        let deep = Measures {
+            penetration_share_max: Some(0.05),
+            ..fine.clone()
+        };
+        assert_eq!(verdict(&deep).state, State::Degraded);
+        let lost = Measures {
+            penetration_share_max: None,
+            ..fine
+        };
+        assert_eq!(verdict(&lost).state, State::Failed);
+    }
+}

@@ -1,0 +1,98 @@
+//! The longest substep with which a method holds on to a body, found on the run.
+
+use super::super::held_body::HeldBody;
+use crate::sim::{Simulation, SolverParams};
+
+/// Frames of undamped release that a stable setting survives: half a second. An unstable one grows
+/// by a factor every substep and is gone long before.
+const FRAMES: u32 = 30;
+/// A particle this many body sizes from its rest was thrown there: a hanging body can't reach it.
+const THROWN_SIZES: f64 = 3.0;
+/// More substeps than this are not tried.
+const SUBSTEPS_MAX: u32 = 8192;
+
+/// The fewest substeps a step that keep the body together; `None` if a single one does.
+pub fn fewest_substeps(body: &HeldBody, params: SolverParams) -> Option<u32> {
+    let is_stable = |substeps| {
+        holds(
+            body,
+            SolverParams {
+                substeps,
+                iterations: 1,
+                ..params
+            },
+        )
+    };
+    fewest(is_stable)
+}
+
+/// The fewest substeps that are stable, by bisection; `None` if one is.
+fn fewest(is_stable: impl Fn(u32) -> bool) -> Option<u32> {
+    if is_stable(1) {
+        return None;
+    }
+    let mut unstable = 1;
+    while unstable < SUBSTEPS_MAX && !is_stable(2 * unstable) {
+        unstable *= 2;
+    }
+    let mut stable = 2 * unstable;
+    while stable - unstable > 1 {
+        let middle = u32::midpoint(stable, unstable);
+        if is_stable(middle) {
+            stable = middle;
+        } else {
+            unstable = middle;
+        }
+    }
+    Some(stable)
+}
+
+fn holds(body: &HeldBody, params: SolverParams) -> bool {
+    let mut simulation = Simulation::new(body.setup.clone(), params);
+    simulation.set_threads(Some(1));
+    let far = THROWN_SIZES * body.size_m;
+    (0..FRAMES).all(|_| {
+        let frozen = simulation.step(&[]).frozen_particles;
+        frozen == 0 && body.farthest_m(simulation.particles()) < far
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::Method;
+    use crate::study::held_body::{Hold, beam};
+
+    #[test]
+    fn bisection_finds_the_edge() {
+        for edge in [2, 3, 17, 64, 1000] {
+            assert_eq!(fewest(|substeps| substeps >= edge), Some(edge));
+        }
+        assert_eq!(fewest(|_| true), None);
+    }
+
+    #[test]
+    fn springs_explode_beyond_a_limit_near_the_estimate_and_constraints_do_not() {
+        let beam = HeldBody::new(beam(2), 1000.0, Hold::End);
+        let params = SolverParams {
+            method: Method::MassSpring,
+            youngs_modulus_pa: 1e5,
+            ..SolverParams::default()
+        };
+        let fewest = fewest_substeps(&beam, params).expect("one substep a frame is too long");
+        let found = f64::from(params.timestep_s) / f64::from(fewest);
+        let estimate = Simulation::new(beam.setup.clone(), params).stable_substep_s();
+        let estimate = f64::from(estimate.expect("springs have an estimate"));
+        // The estimate is a bound on the stiffest mode from below the limit; a motion of half a
+        // length stiffens and softens springs, and may take longer than 30 frames to blow up.
+        assert!(
+            (0.9..4.0).contains(&(found / estimate)),
+            "{found} s against {estimate} s"
+        );
+        let constraints = SolverParams {
+            method: Method::XpbdNeoHookean,
+            ..params
+        };
+        assert_eq!(fewest_substeps(&beam, constraints), None);
+    }
+}

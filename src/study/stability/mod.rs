@@ -1,0 +1,490 @@
+//! The study `stability`: where each method fails, and why.
+//!
+//! Small bodies hang, are poked and are wrecked, over modulus, Poisson's ratio, time step, substeps,
+//! mesh quality, poke speed and start. The cells are those of the grid of all knobs in which at most
+//! two knobs depart from a base setting, and the whole grid of mesh, modulus and substeps.
+
+mod fault;
+mod show;
+mod trial;
+
+pub use trial::Measures;
+
+use super::Study;
+use super::findings::Findings;
+use super::held_body::{HeldBody, Hold, beam, organ, scaled, with_sliver};
+use super::oracle::{self, Tissue};
+use super::sweep::{Row, Sweep};
+use crate::app::AppError;
+use crate::geom::TetMesh;
+use crate::sim::{Method, SolverParams};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::{Arc, Mutex, OnceLock};
+
+/// Density of every body [kg/m³].
+const DENSITY_KG_M3: f32 = 1000.0;
+
+/// What is swept.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    pub body: BodyPlan,
+    pub solver: SolverPlan,
+    pub tool: ToolPlan,
+}
+
+/// The bodies, and how they start.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BodyPlan {
+    pub mesh: Vec<Mesh>,
+    pub start: Vec<Start>,
+    /// Random starts of the default method with nothing else changed.
+    pub seeds: u32,
+}
+
+/// The settings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolverPlan {
+    pub method: Vec<Method>,
+    pub youngs_modulus_pa: Vec<f64>,
+    pub poisson_ratio: Vec<f64>,
+    pub timestep_s: Vec<f64>,
+    pub substeps: Vec<u32>,
+}
+
+/// The tool.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ToolPlan {
+    /// Of the poke; 0 is no poke.
+    pub speed_m_s: Vec<f64>,
+}
+
+/// The bodies there are, of about a thousand tetrahedra.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mesh {
+    /// A beam of 10 × 5 × 5 cm in cubes of a centimetre.
+    Regular,
+    /// The same with one tetrahedron of a thousandth of its volume.
+    Sliver,
+    /// An ellipsoid of 12 × 8 × 6 cm with poor tetrahedra.
+    Organ,
+    /// The beam a tenth as large: tetrahedra of a millimetre.
+    Millimetre,
+}
+
+impl Mesh {
+    const ALL: [Self; 4] = [Self::Regular, Self::Sliver, Self::Organ, Self::Millimetre];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Regular => "regular",
+            Self::Sliver => "sliver",
+            Self::Organ => "organ",
+            Self::Millimetre => "millimetre",
+        }
+    }
+
+    fn tets(self) -> TetMesh {
+        match self {
+            Self::Regular => beam(5),
+            Self::Sliver => with_sliver(beam(5), 1e-3),
+            Self::Organ => organ(6),
+            Self::Millimetre => scaled(beam(5), 0.1),
+        }
+    }
+
+    /// How the body is held where nothing pokes it.
+    fn hold(self) -> Hold {
+        match self {
+            Self::Regular | Self::Sliver | Self::Millimetre => Hold::End,
+            Self::Organ => Hold::Foot,
+        }
+    }
+}
+
+/// How a body starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Start {
+    /// At rest.
+    Rest,
+    /// Settled, then every free particle anywhere in its box.
+    Random,
+    /// Settled, then every free particle in the middle.
+    Point,
+    /// Settled, then every free particle at half height.
+    Plane,
+    /// Settled, then one particle of the tip pulled away by ten lengths.
+    Pull,
+}
+
+impl Start {
+    const ALL: [Self; 5] = [
+        Self::Rest,
+        Self::Random,
+        Self::Point,
+        Self::Plane,
+        Self::Pull,
+    ];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Rest => "rest",
+            Self::Random => "random",
+            Self::Point => "point",
+            Self::Plane => "plane",
+            Self::Pull => "pull",
+        }
+    }
+}
+
+/// One setting of all knobs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cell {
+    pub method: Method,
+    pub mesh: Mesh,
+    pub youngs_modulus_pa: f64,
+    pub poisson_ratio: f64,
+    pub timestep_s: f64,
+    pub substeps: u32,
+    pub iterations: u32,
+    pub poke_speed_m_s: f64,
+    pub start: Start,
+    pub seed: u32,
+}
+
+/// What is done to the body of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// It hangs or stands under gravity.
+    Hang,
+    /// A ball is pushed into it.
+    Poke,
+    /// It is wrecked and let go.
+    Wreck,
+}
+
+impl Cell {
+    fn params(&self) -> SolverParams {
+        SolverParams {
+            method: self.method,
+            timestep_s: self.timestep_s as f32,
+            substeps: self.substeps,
+            iterations: self.iterations,
+            youngs_modulus_pa: self.youngs_modulus_pa as f32,
+            poisson_ratio: self.poisson_ratio as f32,
+        }
+    }
+
+    fn kind(&self) -> Kind {
+        if self.poke_speed_m_s > 0.0 {
+            Kind::Poke
+        } else if self.start != Start::Rest {
+            Kind::Wreck
+        } else {
+            Kind::Hang
+        }
+    }
+
+    /// The length of a substep [s].
+    fn substep_s(&self) -> f64 {
+        self.timestep_s / f64::from(self.substeps)
+    }
+}
+
+/// A static oracle: positions [m], or why there are none.
+type Equilibrium = Result<Vec<DVec3>, String>;
+
+/// The study with what its cells share.
+pub struct Stability {
+    /// Each mesh, held where nothing pokes it.
+    hanging: HashMap<Mesh, HeldBody>,
+    /// The same, held by its foot.
+    standing: HashMap<Mesh, HeldBody>,
+    /// By mesh, modulus and Poisson's ratio; made by the first cell that asks.
+    equilibria: Mutex<HashMap<String, Arc<OnceLock<Equilibrium>>>>,
+}
+
+impl Sweep for Stability {
+    const STUDY: Study = Study::Stability;
+    const SIDE_BY_SIDE: bool = true;
+    type Plan = Plan;
+    type Cell = Cell;
+    type Measures = Measures;
+
+    fn plan(quick: bool) -> Plan {
+        if quick {
+            return Plan {
+                body: BodyPlan {
+                    mesh: vec![Mesh::Regular, Mesh::Sliver],
+                    start: vec![Start::Rest, Start::Random, Start::Pull],
+                    seeds: 2,
+                },
+                solver: SolverPlan {
+                    method: Method::ALL.to_vec(),
+                    youngs_modulus_pa: vec![1e3, 1e4, 1e6],
+                    poisson_ratio: vec![0.45],
+                    timestep_s: vec![1.0 / 60.0],
+                    substeps: vec![1, 20],
+                },
+                tool: ToolPlan {
+                    speed_m_s: vec![0.0, 1.0],
+                },
+            };
+        }
+        Plan {
+            body: BodyPlan {
+                mesh: Mesh::ALL.to_vec(),
+                start: Start::ALL.to_vec(),
+                seeds: 20,
+            },
+            solver: SolverPlan {
+                method: Method::ALL.to_vec(),
+                youngs_modulus_pa: vec![1e3, 1e4, 1e5, 1e6, 1e7],
+                poisson_ratio: vec![0.0, 0.3, 0.45, 0.49],
+                timestep_s: vec![1.0 / 30.0, 1.0 / 60.0, 1.0 / 120.0],
+                substeps: vec![1, 5, 20, 40],
+            },
+            tool: ToolPlan {
+                speed_m_s: vec![0.0, 0.01, 0.1, 1.0, 10.0],
+            },
+        }
+    }
+
+    fn cells(plan: &Plan) -> Result<Vec<Cell>, String> {
+        let cells = cells(plan);
+        if let Some(problem) = cells.iter().find_map(|cell| cell.params().problem()) {
+            return Err(format!("solver.{problem}"));
+        }
+        let speeds = &plan.tool.speed_m_s;
+        match speeds.iter().find(|speed| !(0.0..=100.0).contains(*speed)) {
+            Some(speed) => Err(format!(
+                "tool.speed_m_s = {speed} is out of range: choose from 0 to 100"
+            )),
+            None => Ok(cells),
+        }
+    }
+
+    fn new(plan: &Plan, _: &Path, _: usize) -> Result<Self, AppError> {
+        let bodies = |hold: &dyn Fn(Mesh) -> Hold| -> HashMap<Mesh, HeldBody> {
+            let body = |&mesh: &Mesh| {
+                let body = HeldBody::new(mesh.tets(), DENSITY_KG_M3, hold(mesh));
+                (mesh, body)
+            };
+            plan.body.mesh.iter().map(body).collect()
+        };
+        Ok(Self {
+            hanging: bodies(&Mesh::hold),
+            standing: bodies(&|_| Hold::Foot),
+            equilibria: Mutex::default(),
+        })
+    }
+
+    fn measure(&self, cell: &Cell) -> Result<Row<Cell, Measures>, AppError> {
+        let (hanging, standing) = (&self.hanging[&cell.mesh], &self.standing[&cell.mesh]);
+        Ok(match cell.kind() {
+            Kind::Hang => {
+                let equilibrium = self.equilibrium(cell);
+                trial::hang(
+                    cell,
+                    hanging,
+                    equilibrium.get().and_then(|e| e.as_deref().ok()),
+                )
+            }
+            Kind::Wreck => trial::wreck(cell, hanging),
+            Kind::Poke => trial::poke(cell, standing),
+        })
+    }
+
+    fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
+        show::findings(rows)
+    }
+}
+
+impl Stability {
+    /// The static oracle of a cell, filled.
+    fn equilibrium(&self, cell: &Cell) -> Arc<OnceLock<Equilibrium>> {
+        let key = format!(
+            "{} {} {}",
+            cell.mesh.name(),
+            cell.youngs_modulus_pa,
+            cell.poisson_ratio
+        );
+        let place = {
+            let mut all = self.equilibria.lock().expect("no cell panics");
+            all.entry(key).or_default().clone()
+        };
+        // Outside the lock: other cells go on while this one is solved, and none solves it twice.
+        place.get_or_init(|| {
+            let tissue = Tissue {
+                youngs_modulus_pa: cell.youngs_modulus_pa,
+                poisson_ratio: cell.poisson_ratio,
+            };
+            oracle::settled_m(&self.hanging[&cell.mesh], tissue).map_err(|error| error.to_string())
+        });
+        place
+    }
+}
+
+/// The cells of a plan; see the head of this file.
+fn cells(plan: &Plan) -> Vec<Cell> {
+    let (body, solver) = (&plan.body, &plan.solver);
+    let default = SolverParams::default();
+    let base = Cell {
+        method: default.method,
+        mesh: or_first(&body.mesh, Mesh::Regular),
+        youngs_modulus_pa: or_first(&solver.youngs_modulus_pa, 1e4),
+        poisson_ratio: or_first(&solver.poisson_ratio, 0.45),
+        timestep_s: or_first(&solver.timestep_s, 1.0 / 60.0),
+        substeps: or_first(&solver.substeps, default.substeps),
+        iterations: 1,
+        poke_speed_m_s: or_first(&plan.tool.speed_m_s, 0.0),
+        start: or_first(&body.start, Start::Rest),
+        seed: 0,
+    };
+    let mut cells = vec![base.clone()];
+    over(&mut cells, &solver.method, |cell, value| {
+        cell.method = value
+    });
+    over(&mut cells, &body.mesh, |cell, value| cell.mesh = value);
+    over(&mut cells, &solver.youngs_modulus_pa, |cell, value| {
+        cell.youngs_modulus_pa = value;
+    });
+    over(&mut cells, &solver.poisson_ratio, |cell, value| {
+        cell.poisson_ratio = value;
+    });
+    over(&mut cells, &solver.timestep_s, |cell, value| {
+        cell.timestep_s = value
+    });
+    over(&mut cells, &solver.substeps, |cell, value| {
+        cell.substeps = value
+    });
+    over(&mut cells, &plan.tool.speed_m_s, |cell, value| {
+        cell.poke_speed_m_s = value;
+    });
+    over(&mut cells, &body.start, |cell, value| cell.start = value);
+    cells.retain(|cell| is_worthwhile(cell, &base));
+    cells
+        .into_iter()
+        .flat_map(|cell| {
+            let is_seeded = cell.method == default.method
+                && cell.start == Start::Random
+                && departures(&cell, &base) == 1;
+            let seeds = if is_seeded { body.seeds.max(1) } else { 1 };
+            (0..seeds).map(move |seed| Cell {
+                seed,
+                ..cell.clone()
+            })
+        })
+        .collect()
+}
+
+/// Puts in place of each cell one for each of `values`.
+fn over<T: Copy>(cells: &mut Vec<Cell>, values: &[T], set: impl Fn(&mut Cell, T)) {
+    let with = |cell: &Cell| -> Vec<Cell> {
+        let mut copies = vec![cell.clone(); values.len()];
+        for (copy, &value) in copies.iter_mut().zip(values) {
+            set(copy, value);
+        }
+        copies
+    };
+    *cells = cells.iter().flat_map(with).collect();
+}
+
+/// `wanted` if it is among the values, else the first of them.
+fn or_first<T: Copy + PartialEq>(values: &[T], wanted: T) -> T {
+    if values.contains(&wanted) {
+        wanted
+    } else {
+        values.first().copied().unwrap_or(wanted)
+    }
+}
+
+/// How many knobs, the method apart, are not those of `base`.
+fn departures(cell: &Cell, base: &Cell) -> usize {
+    [
+        cell.mesh != base.mesh,
+        cell.youngs_modulus_pa != base.youngs_modulus_pa,
+        cell.poisson_ratio != base.poisson_ratio,
+        cell.timestep_s != base.timestep_s,
+        cell.substeps != base.substeps,
+        cell.poke_speed_m_s != base.poke_speed_m_s,
+        cell.start != base.start,
+    ]
+    .into_iter()
+    .filter(|&departs| departs)
+    .count()
+}
+
+fn is_worthwhile(cell: &Cell, base: &Cell) -> bool {
+    // A body is poked from rest, and wrecked without a tool.
+    if cell.poke_speed_m_s > 0.0 && cell.start != Start::Rest {
+        return false;
+    }
+    let on_the_map = Cell {
+        mesh: base.mesh,
+        youngs_modulus_pa: base.youngs_modulus_pa,
+        substeps: base.substeps,
+        ..cell.clone()
+    };
+    departures(cell, base) <= 2 || departures(&on_the_map, base) == 0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plan_has_more_than_five_hundred_cells_and_each_knob_at_each_value() {
+        let plan = Stability::plan(false);
+        let cells = Stability::cells(&plan).expect("the plan is sound");
+        assert!((500..2000).contains(&cells.len()), "{}", cells.len());
+        for &method in &plan.solver.method {
+            let cells = || cells.iter().filter(move |cell| cell.method == method);
+            for &e in &plan.solver.youngs_modulus_pa {
+                for &mesh in &plan.body.mesh {
+                    for &substeps in &plan.solver.substeps {
+                        assert!(cells().any(|c| c.youngs_modulus_pa == e
+                            && c.mesh == mesh
+                            && c.substeps == substeps
+                            && c.kind() == Kind::Hang));
+                    }
+                    for &speed in &plan.tool.speed_m_s {
+                        assert!(cells().any(|c| c.mesh == mesh && c.poke_speed_m_s == speed));
+                    }
+                }
+            }
+        }
+        let default = SolverParams::default().method;
+        let random = |c: &&Cell| c.method == default && c.start == Start::Random && c.seed > 0;
+        assert_eq!(cells.iter().filter(random).count(), 19);
+    }
+
+    #[test]
+    fn list_of_one_value_is_the_base_of_all_cells() {
+        let mut plan = Stability::plan(true);
+        plan.solver.youngs_modulus_pa = vec![1e7];
+        plan.solver.substeps = vec![1];
+        let cells = Stability::cells(&plan).expect("the plan is sound");
+        assert!(cells.len() > 10);
+        assert!(
+            cells
+                .iter()
+                .all(|cell| cell.youngs_modulus_pa == 1e7 && cell.substeps == 1)
+        );
+    }
+
+    #[test]
+    fn unknown_speeds_are_refused() {
+        let mut plan = Stability::plan(true);
+        plan.tool.speed_m_s = vec![0.0, f64::NAN];
+        assert!(Stability::cells(&plan).unwrap_err().contains("0 to 100"));
+    }
+}

@@ -1,0 +1,562 @@
+//! Maps, envelope and tables of the study, from its rows alone.
+
+use super::super::findings::Findings;
+use super::super::sweep::{Row, State};
+use super::fault::Fault;
+use super::{Cell, Kind, Measures, Mesh, Start};
+use crate::measure::chart::{number, three_digits};
+use crate::measure::map::{MapChart, Panel, Tile};
+use crate::measure::page::{Block, Table};
+use crate::measure::scatter::stack;
+use crate::sim::{Method, SolverParams};
+
+type StabilityRow = Row<Cell, Measures>;
+
+/// Failed cells of the default method that are listed; the rest are counted.
+const LISTED_MAX: usize = 40;
+
+/// What the rows say.
+pub fn findings(rows: &[StabilityRow]) -> Findings {
+    let maps = [
+        map_of_moduli_and_substeps(rows),
+        map_of_pokes(rows),
+        map_of_starts(rows),
+        map_of_ratios(rows),
+    ];
+    let maps: Vec<&MapChart> = maps.iter().flatten().collect();
+    let pictures: Vec<_> = maps.iter().map(|map| (map.svg(), map.size_px())).collect();
+    let mut blocks = vec![Block::Paragraph(lead(rows))];
+    blocks.extend(maps.iter().map(|map| Block::Chart {
+        svg: map.svg(),
+        caption: "Each tile is the worst of the cells at its two values. Nothing was measured where there \
+                  is none."
+            .to_owned(),
+    }));
+    blocks.push(Block::Paragraph(
+        "The envelope: the largest modulus up to which no cell failed, for so many substeps or more, whatever \
+         the other knobs (mesh, Poisson's ratio, time step, poke speed, start); with the number of cells in \
+         it."
+            .to_owned(),
+    ));
+    blocks.push(Block::Table(envelope(rows)));
+    blocks.push(Block::Paragraph(
+        "The same as one number: h² E / (ρ dx²), with h the substep and dx the edge of a mean tetrahedron, \
+         below which no hanging or standing body failed."
+            .to_owned(),
+    ));
+    blocks.push(Block::Table(stiffness(rows)));
+    let recovery = recovery(rows);
+    if !recovery.rows.is_empty() {
+        blocks.push(Block::Paragraph(
+            "Frames until a wrecked body stays within 2 % of its size (RMS) of its settled state without a \
+             newly inverted tetrahedron, with nothing but the start changed."
+                .to_owned(),
+        ));
+        blocks.push(Block::Table(recovery));
+    }
+    blocks.push(Block::Paragraph(
+        "Failed cells by their worst fault.".to_owned(),
+    ));
+    blocks.push(Block::Table(faults(rows)));
+    let listed = failed_of_default(rows);
+    if !listed.rows.is_empty() {
+        blocks.push(Block::Paragraph(format!(
+            "What failed with the default method, {}, at most {LISTED_MAX} of them; NAME.csv has all.",
+            SolverParams::default().method.name()
+        )));
+        blocks.push(Block::Table(listed));
+    }
+    Findings {
+        svg: stack(&pictures),
+        blocks,
+    }
+}
+
+fn lead(rows: &[StabilityRow]) -> String {
+    let methods = methods(rows).into_iter().map(|method| {
+        let of = |state| {
+            let here =
+                |row: &&StabilityRow| row.cell.method == method && row.verdict.state == state;
+            rows.iter().filter(here).count()
+        };
+        format!(
+            "{}: {} fine, {} degraded, {} failed",
+            method.name(),
+            of(State::Fine),
+            of(State::Degraded),
+            of(State::Failed)
+        )
+    });
+    format!(
+        "{} cells on bodies of about a thousand tetrahedra. {}.",
+        rows.len(),
+        methods.collect::<Vec<_>>().join("; ")
+    )
+}
+
+/// Values in the order of a list, each once.
+fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
+    let mut all = Vec::new();
+    for value in values {
+        if !all.contains(&value) {
+            all.push(value);
+        }
+    }
+    all
+}
+
+fn ascending(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut values = distinct(values);
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+fn methods(rows: &[StabilityRow]) -> Vec<Method> {
+    distinct(rows.iter().map(|row| row.cell.method))
+}
+
+fn meshes(rows: &[StabilityRow]) -> Vec<Mesh> {
+    let mut meshes = distinct(rows.iter().map(|row| row.cell.mesh));
+    meshes.sort_unstable();
+    meshes
+}
+
+fn tile(row: &StabilityRow) -> Tile {
+    match row.verdict.state {
+        State::Fine => Tile::Fine,
+        State::Degraded => Tile::Degraded,
+        State::Failed => Tile::Failed,
+    }
+}
+
+/// A panel of the rows that pass `filter`, placed by the index of two of their values.
+fn panel<X: PartialEq, Y: PartialEq>(
+    title: String,
+    rows: &[&StabilityRow],
+    filter: impl Fn(&StabilityRow) -> bool,
+    (columns, x): (&[X], impl Fn(&StabilityRow) -> X),
+    (lines, y): (&[Y], impl Fn(&StabilityRow) -> Y),
+) -> Panel {
+    let place = |row: &&StabilityRow| {
+        let column = columns.iter().position(|value| *value == x(row))?;
+        let line = lines.iter().position(|value| *value == y(row))?;
+        Some((column, line, tile(row)))
+    };
+    let here = rows.iter().copied().filter(|row| filter(row));
+    Panel {
+        title,
+        points: here.filter_map(|row| place(&row)).collect(),
+    }
+}
+
+fn of_kind(rows: &[StabilityRow], kind: Kind) -> Vec<&StabilityRow> {
+    rows.iter().filter(|row| row.cell.kind() == kind).collect()
+}
+
+fn moduli(rows: &[&StabilityRow]) -> Vec<f64> {
+    ascending(rows.iter().map(|row| row.cell.youngs_modulus_pa))
+}
+
+fn words(values: &[f64]) -> Vec<String> {
+    values.iter().map(|&value| number(value)).collect()
+}
+
+/// Modulus against substep, a panel a method and mesh.
+fn map_of_moduli_and_substeps(rows: &[StabilityRow]) -> Option<MapChart> {
+    let hanging = of_kind(rows, Kind::Hang);
+    let substeps = distinct(hanging.iter().map(|row| row.cell.substep_s()));
+    let mut substeps = substeps;
+    substeps.sort_by(|a, b| b.total_cmp(a));
+    let moduli = moduli(&hanging);
+    let meshes = meshes(rows);
+    let panels = methods(rows).into_iter().flat_map(|method| {
+        let (hanging, substeps, moduli) = (&hanging, &substeps, &moduli);
+        meshes.iter().map(move |&mesh| {
+            panel(
+                format!("{}, {}", method.name(), mesh.name()),
+                hanging,
+                |row| (row.cell.method, row.cell.mesh) == (method, mesh),
+                (substeps, |row| row.cell.substep_s()),
+                (moduli, |row| row.cell.youngs_modulus_pa),
+            )
+        })
+    });
+    let panels: Vec<Panel> = panels.collect();
+    let milliseconds = |s: &f64| {
+        // Two digits: the tiles are narrow.
+        let ms = 1e3 * s;
+        if ms < 9.5 {
+            format!("{ms:.1}")
+        } else {
+            format!("{ms:.0}")
+        }
+    };
+    (!hanging.is_empty()).then(|| MapChart {
+        title: "Hanging and standing bodies: modulus against substep".to_owned(),
+        x_label: "substep [ms]".to_owned(),
+        columns: substeps.iter().map(milliseconds).collect(),
+        y_label: "E [Pa]".to_owned(),
+        rows: words(&moduli),
+        panels_across: meshes.len(),
+        panels,
+    })
+}
+
+/// Poke speed against mesh and against modulus.
+fn map_of_pokes(rows: &[StabilityRow]) -> Option<MapChart> {
+    let poked = of_kind(rows, Kind::Poke);
+    let speeds = ascending(poked.iter().map(|row| row.cell.poke_speed_m_s));
+    let moduli = moduli(&poked);
+    let panels = |method: Method| {
+        panel(
+            method.name().to_owned(),
+            &poked,
+            |row| row.cell.method == method,
+            (&speeds, |row| row.cell.poke_speed_m_s),
+            (&moduli, |row| row.cell.youngs_modulus_pa),
+        )
+    };
+    let methods = methods(rows);
+    (!poked.is_empty()).then(|| MapChart {
+        title: "Poked bodies: modulus against speed of the tool".to_owned(),
+        x_label: "speed [m/s]".to_owned(),
+        columns: words(&speeds),
+        y_label: "E [Pa]".to_owned(),
+        rows: words(&moduli),
+        panels_across: methods.len(),
+        panels: methods.into_iter().map(panels).collect(),
+    })
+}
+
+/// Start against mesh.
+fn map_of_starts(rows: &[StabilityRow]) -> Option<MapChart> {
+    let wrecked = of_kind(rows, Kind::Wreck);
+    let meshes = meshes(rows);
+    let mut starts: Vec<Start> = distinct(wrecked.iter().map(|row| row.cell.start));
+    starts.sort_unstable();
+    let panels = |method: Method| {
+        panel(
+            method.name().to_owned(),
+            &wrecked,
+            |row| row.cell.method == method,
+            (&meshes, |row| row.cell.mesh),
+            (&starts, |row| row.cell.start),
+        )
+    };
+    let methods = methods(rows);
+    // Four letters are as wide as a tile.
+    let short = |mesh: &Mesh| mesh.name().chars().take(4).collect();
+    (!wrecked.is_empty()).then(|| MapChart {
+        title: "Wrecked bodies: start against mesh".to_owned(),
+        x_label: "mesh".to_owned(),
+        columns: meshes.iter().map(short).collect(),
+        y_label: "start".to_owned(),
+        rows: starts.iter().map(|start| start.name().to_owned()).collect(),
+        panels_across: methods.len(),
+        panels: methods.into_iter().map(panels).collect(),
+    })
+}
+
+/// Modulus against Poisson's ratio.
+fn map_of_ratios(rows: &[StabilityRow]) -> Option<MapChart> {
+    let hanging = of_kind(rows, Kind::Hang);
+    let ratios = ascending(hanging.iter().map(|row| row.cell.poisson_ratio));
+    let moduli = moduli(&hanging);
+    let default = SolverParams::default();
+    let panels = |method: Method| {
+        panel(
+            method.name().to_owned(),
+            &hanging,
+            |row| row.cell.method == method && row.cell.substeps == default.substeps,
+            (&ratios, |row| row.cell.poisson_ratio),
+            (&moduli, |row| row.cell.youngs_modulus_pa),
+        )
+    };
+    let methods = methods(rows);
+    (ratios.len() > 1).then(|| MapChart {
+        title: format!(
+            "Hanging and standing bodies, {} substeps: modulus against Poisson's ratio",
+            default.substeps
+        ),
+        x_label: "ν".to_owned(),
+        columns: words(&ratios),
+        y_label: "E [Pa]".to_owned(),
+        rows: words(&moduli),
+        panels_across: methods.len(),
+        panels: methods.into_iter().map(panels).collect(),
+    })
+}
+
+/// For each method and number of substeps, the largest modulus up to which nothing failed.
+fn envelope(rows: &[StabilityRow]) -> Table {
+    let mut substeps = distinct(rows.iter().map(|row| row.cell.substeps));
+    substeps.sort_unstable();
+    let kinds = [Kind::Hang, Kind::Poke, Kind::Wreck];
+    let mut lines = Vec::new();
+    for method in methods(rows) {
+        for &at_least in &substeps {
+            let mut line = vec![method.name().to_owned(), at_least.to_string()];
+            for kind in kinds {
+                let inside: Vec<&StabilityRow> = rows
+                    .iter()
+                    .filter(|row| row.cell.method == method && row.cell.kind() == kind)
+                    .filter(|row| row.cell.substeps >= at_least)
+                    .collect();
+                line.push(match largest_safe_modulus(&inside) {
+                    Some((modulus, cells)) => format!("E ≤ {} Pa ({cells})", number(modulus)),
+                    None if inside.is_empty() => String::new(),
+                    None => "none".to_owned(),
+                });
+            }
+            lines.push(line);
+        }
+    }
+    table(
+        &[
+            "method",
+            "substeps ≥",
+            "hangs or stands",
+            "poked",
+            "wrecked",
+        ],
+        lines,
+    )
+}
+
+/// The largest modulus of the rows such that no row of it or a smaller one failed, and how many rows
+/// that are.
+fn largest_safe_modulus(rows: &[&StabilityRow]) -> Option<(f64, usize)> {
+    let failed = rows.iter().filter(|row| row.verdict.state == State::Failed);
+    let softest_failed = failed
+        .map(|row| row.cell.youngs_modulus_pa)
+        .fold(f64::INFINITY, f64::min);
+    let safe = || {
+        let moduli = rows.iter().map(|row| row.cell.youngs_modulus_pa);
+        moduli.filter(|modulus| *modulus < softest_failed)
+    };
+    safe()
+        .reduce(f64::max)
+        .map(|modulus| (modulus, safe().count()))
+}
+
+/// h² E / (ρ dx²) below which no hanging body failed.
+fn stiffness(rows: &[StabilityRow]) -> Table {
+    let lines = methods(rows).into_iter().map(|method| {
+        let mut hanging: Vec<&StabilityRow> = of_kind(rows, Kind::Hang)
+            .into_iter()
+            .filter(|row| row.cell.method == method)
+            .collect();
+        hanging.sort_by(|a, b| {
+            let number = |row: &StabilityRow| row.measures.stiffness_number;
+            number(a).total_cmp(&number(b))
+        });
+        let safe = hanging
+            .iter()
+            .take_while(|row| row.verdict.state != State::Failed)
+            .count();
+        let number_of = |row: &&StabilityRow| three_digits(row.measures.stiffness_number);
+        vec![
+            method.name().to_owned(),
+            safe.checked_sub(1)
+                .map_or("none".to_owned(), |last| number_of(&hanging[last])),
+            safe.to_string(),
+            hanging.get(safe).map_or_else(String::new, |row| {
+                format!("at {}: {}", number_of(row), row.verdict.why)
+            }),
+        ]
+    });
+    table(
+        &["method", "none failed up to", "cells", "the next"],
+        lines.collect(),
+    )
+}
+
+/// Frames to recover for each method and start, with nothing else changed.
+fn recovery(rows: &[StabilityRow]) -> Table {
+    let wrecked = of_kind(rows, Kind::Wreck);
+    let mut starts: Vec<Start> = distinct(wrecked.iter().map(|row| row.cell.start));
+    starts.sort_unstable();
+    let default = SolverParams::default();
+    let mut lines = Vec::new();
+    for method in methods(rows) {
+        for mesh in meshes(rows) {
+            for &start in &starts {
+                let frames: Vec<Option<u32>> = wrecked
+                    .iter()
+                    .filter(|row| {
+                        let cell = &row.cell;
+                        (cell.method, cell.mesh, cell.start) == (method, mesh, start)
+                            && cell.substeps == default.substeps
+                            && cell.youngs_modulus_pa == 1e4
+                            && cell.poisson_ratio == 0.45
+                            && cell.timestep_s == 1.0 / 60.0
+                    })
+                    .map(|row| row.measures.frames_to_recover)
+                    .collect();
+                if frames.is_empty() {
+                    continue;
+                }
+                let mut back: Vec<u32> = frames.iter().copied().flatten().collect();
+                back.sort_unstable();
+                let at = |index: usize| back.get(index).map_or_else(String::new, u32::to_string);
+                lines.push(vec![
+                    method.name().to_owned(),
+                    mesh.name().to_owned(),
+                    start.name().to_owned(),
+                    format!("{} of {}", back.len(), frames.len()),
+                    at(back.len() / 2),
+                    at(back.len().saturating_sub(1)),
+                ]);
+            }
+        }
+    }
+    table(
+        &[
+            "method",
+            "mesh",
+            "start",
+            "recovered",
+            "median frame",
+            "latest",
+        ],
+        lines,
+    )
+}
+
+/// Failed cells, counted by fault and method.
+fn faults(rows: &[StabilityRow]) -> Table {
+    let methods = methods(rows);
+    let head: Vec<&str> = std::iter::once("fault")
+        .chain(methods.iter().map(|method| method.name()))
+        .collect();
+    let failed = |fault: Fault, method: Method| {
+        let here = |row: &&StabilityRow| {
+            row.cell.method == method
+                && row.measures.fault == Some(fault)
+                && row.verdict.state == State::Failed
+        };
+        rows.iter().filter(here).count()
+    };
+    let lines = Fault::ALL.into_iter().map(|fault| {
+        let counts = methods
+            .iter()
+            .map(|&method| failed(fault, method).to_string());
+        std::iter::once(fault.name().to_owned())
+            .chain(counts)
+            .collect()
+    });
+    table(&head, lines.collect())
+}
+
+fn failed_of_default(rows: &[StabilityRow]) -> Table {
+    let default = SolverParams::default().method;
+    let failed =
+        |row: &&StabilityRow| row.cell.method == default && row.verdict.state == State::Failed;
+    let line = |row: &StabilityRow| {
+        let cell = &row.cell;
+        let poke = match cell.poke_speed_m_s {
+            0.0 => String::new(),
+            speed => format!("{} m/s", number(speed)),
+        };
+        vec![
+            cell.mesh.name().to_owned(),
+            number(cell.youngs_modulus_pa),
+            number(cell.poisson_ratio),
+            three_digits(1e3 * cell.timestep_s),
+            cell.substeps.to_string(),
+            poke,
+            format!("{}", cell.start.name()),
+            row.verdict.why.clone(),
+        ]
+    };
+    table(
+        &[
+            "mesh", "E Pa", "ν", "dt ms", "substeps", "poke", "start", "why",
+        ],
+        rows.iter()
+            .filter(failed)
+            .take(LISTED_MAX)
+            .map(line)
+            .collect(),
+    )
+}
+
+fn table(head: &[&str], rows: Vec<Vec<String>>) -> Table {
+    Table {
+        head: head.iter().map(|&word| word.to_owned()).collect(),
+        rows,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::sweep::{Cost, Verdict};
+
+    fn row(youngs_modulus_pa: f64, substeps: u32, state: State) -> StabilityRow {
+        Row {
+            cell: Cell {
+                method: Method::XpbdNeoHookean,
+                mesh: Mesh::Regular,
+                youngs_modulus_pa,
+                poisson_ratio: 0.45,
+                timestep_s: 1.0 / 60.0,
+                substeps,
+                iterations: 1,
+                poke_speed_m_s: 0.0,
+                start: Start::Rest,
+                seed: 0,
+            },
+            measures: Measures {
+                stiffness_number: youngs_modulus_pa / f64::from(substeps).powi(2),
+                fault: (state == State::Failed).then_some(Fault::Explodes),
+                ..Measures::default()
+            },
+            cost: Cost::default(),
+            verdict: Verdict {
+                state,
+                why: state.name().to_owned(),
+            },
+        }
+    }
+
+    #[test]
+    fn envelope_ends_below_the_softest_failure_and_grows_with_substeps() {
+        let rows = [
+            row(1e3, 1, State::Fine),
+            row(1e4, 1, State::Failed),
+            row(1e5, 1, State::Fine),
+            row(1e3, 20, State::Fine),
+            row(1e4, 20, State::Degraded),
+            row(1e5, 20, State::Fine),
+        ];
+        let table = envelope(&rows);
+        assert_eq!(table.rows[0][1..3], ["1", "E ≤ 1000 Pa (2)"]);
+        assert_eq!(table.rows[1][1..3], ["20", "E ≤ 1·10⁵ Pa (3)"]);
+        // Sabotage: with the softest cell failed there is no envelope.
+        let mut worse = rows.to_vec();
+        worse[0] = row(1e3, 1, State::Failed);
+        assert_eq!(envelope(&worse).rows[0][2], "none");
+    }
+
+    #[test]
+    fn stiffness_number_ends_at_the_first_failure() {
+        let rows = [
+            row(1e5, 1, State::Fine),
+            row(1e4, 1, State::Failed),
+            row(1e3, 1, State::Fine),
+        ];
+        let table = stiffness(&rows);
+        assert_eq!(table.rows[0][1..3], ["1000", "1"]);
+        assert!(table.rows[0][3].contains("failed"));
+    }
+
+    #[test]
+    fn maps_and_tables_of_any_rows_can_be_drawn() {
+        for rows in [vec![], vec![row(1e3, 1, State::Failed)]] {
+            let findings = findings(&rows);
+            assert!(!findings.svg.contains("NaN"));
+            assert!(!findings.text().is_empty());
+        }
+    }
+}

@@ -1,0 +1,443 @@
+//! What is done to one body: it hangs, it is wrecked, or it is poked.
+
+use super::super::held_body::{GRAVITY_M_S2, HeldBody};
+use super::super::random::Random;
+use super::super::sweep::{Cost, Row, finite};
+use super::super::timing::{Clock, Times};
+use super::fault::{BACK_RMS, Fault, judge};
+use super::{Cell, Start};
+use crate::geom::bounds;
+use crate::sim::diagnose::{energy, volume_and_inverted};
+use crate::sim::{Simulation, ToolAction, ToolInput, ToolShape};
+use glam::{DMat3, DVec3, Vec3};
+use serde::{Deserialize, Serialize};
+
+/// Frames without any force, in which nothing may move.
+const REST_FRAMES: u32 = 60;
+/// Frames of undamped release, in which no energy may be gained.
+const RELEASE_FRAMES: u32 = 60;
+/// Frames of damping, after which a body hangs still.
+const SETTLE_FRAMES: u32 = 150;
+/// Frames in which a wrecked body must be back.
+const RECOVER_FRAMES: u32 = 180;
+/// Damping of a body that is to settle [1/s].
+const DAMPING_PER_S: f32 = 10.0;
+/// Radius of the tool, and how deep its front is pushed in, as shares of the thickness.
+const TOOL_RADIUS_SHARE: f32 = 0.2;
+const TOOL_DEPTH_SHARE: f32 = 0.3;
+/// Frames the tool stays there, and frames after it has left.
+const HOLD_FRAMES: u32 = 20;
+const AFTER_FRAMES: u32 = 60;
+/// Friction of the tool.
+const FRICTION: f32 = 0.3;
+
+/// What is measured of a trial; absent where the trial has no such thing.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Measures {
+    pub tets: usize,
+    /// Edge of a regular tetrahedron of the mean volume, dx [m].
+    pub edge_m: f64,
+    /// h² E / (ρ dx²): how far a stiff wave runs in a substep h, in edges, squared.
+    pub stiffness_number: f64,
+    /// What errors are against.
+    pub oracle: String,
+    /// The kind of the worst fault.
+    pub fault: Option<Fault>,
+    /// Frame in which a particle was frozen because it was not finite.
+    pub not_finite_frame: Option<u32>,
+    /// Largest distance from rest on the way, in body sizes.
+    pub farthest_sizes: Option<f64>,
+    /// Way without any force, in body sizes.
+    pub drift_sizes: Option<f64>,
+    /// Energy gained in undamped release, over the work of gravity down to the static sag.
+    pub energy_growth_rel: Option<f64>,
+    /// Sag of the tip over the static one.
+    pub sag_ratio: Option<f64>,
+    /// At the end.
+    pub inverted_tets: Option<usize>,
+    pub speed_left_m_s: Option<f64>,
+    /// Volume off that of the static solution, or that at rest, at the end; as a share.
+    pub volume_error_rel: Option<f64>,
+    /// Frames from the wreck until the body stays near its settled state without a newly inverted
+    /// tetrahedron.
+    pub frames_to_recover: Option<u32>,
+    /// RMS distance from the settled state at the end, in body sizes.
+    pub rms_left_sizes: Option<f64>,
+    /// Deepest surface point inside the tool, as a share of the thickness.
+    pub penetration_share: Option<f64>,
+    /// Whether the tool ended up inside the tissue.
+    pub tunnelled: Option<bool>,
+    /// Largest force on the tool [N].
+    pub force_max_n: Option<f64>,
+}
+
+/// A body under way, watched.
+struct Watched<'a> {
+    body: &'a HeldBody,
+    simulation: Simulation,
+    times: Times,
+    frame: u32,
+    not_finite_frame: Option<u32>,
+    farthest_m: f64,
+}
+
+impl<'a> Watched<'a> {
+    fn new(cell: &Cell, body: &'a HeldBody, gravity_m_s2: Vec3, damping_per_s: f32) -> Self {
+        let mut setup = body.setup.clone();
+        setup.gravity_m_s2 = gravity_m_s2;
+        setup.damping_per_s = damping_per_s;
+        let mut simulation = Simulation::new(setup, cell.params());
+        // Cells are measured side by side, each on a thread.
+        simulation.set_threads(Some(1));
+        Self {
+            body,
+            simulation,
+            times: Times::default(),
+            frame: 0,
+            not_finite_frame: None,
+            farthest_m: 0.0,
+        }
+    }
+
+    fn step(&mut self, tools: &[ToolInput]) {
+        let clock = Clock::start();
+        let frozen = self.simulation.step(tools).frozen_particles;
+        self.times.add(clock);
+        self.frame += 1;
+        if frozen > 0 {
+            self.not_finite_frame.get_or_insert(self.frame);
+        }
+        self.farthest_m = self
+            .farthest_m
+            .max(self.body.farthest_m(self.simulation.particles()));
+    }
+
+    fn steps(&mut self, frames: u32) {
+        (0..frames).for_each(|_| self.step(&[]));
+    }
+
+    /// What every trial measures at its end.
+    fn measures(&self, cell: &Cell, oracle: &str) -> Measures {
+        let report = self.simulation.report();
+        let edge_m = self.body.edge_m();
+        let density = f64::from(super::DENSITY_KG_M3);
+        let wave_m = cell.substep_s() * (cell.youngs_modulus_pa / density).sqrt();
+        Measures {
+            tets: self.body.setup.tets.tets.len(),
+            edge_m,
+            stiffness_number: (wave_m / edge_m).powi(2),
+            oracle: oracle.to_owned(),
+            not_finite_frame: self.not_finite_frame,
+            farthest_sizes: finite(self.farthest_m / self.body.size_m),
+            inverted_tets: Some(report.inverted_tets),
+            speed_left_m_s: finite(f64::from(report.speed_max_m_s)),
+            ..Measures::default()
+        }
+    }
+
+    fn row(&self, cell: &Cell, mut measures: Measures) -> Row<Cell, Measures> {
+        let (verdict, fault) = judge(&measures);
+        measures.fault = fault;
+        let wall = self.times.wall();
+        Row {
+            cell: cell.clone(),
+            measures,
+            cost: Cost {
+                ms_p50: wall.map(|(median, _)| median),
+                ms_p95: wall.map(|(_, p95)| p95),
+            },
+            verdict,
+        }
+    }
+}
+
+/// Rest, undamped release, damped settling. `equilibrium` is the static solution [m].
+pub fn hang(cell: &Cell, body: &HeldBody, equilibrium: Option<&[DVec3]>) -> Row<Cell, Measures> {
+    let mut resting = Watched::new(cell, body, Vec3::ZERO, 0.0);
+    resting.steps(REST_FRAMES);
+    let mut hanging = Watched::new(cell, body, GRAVITY_M_S2, 0.0);
+    let start_j = energy(&hanging.simulation).total_j();
+    let mut highest_j = start_j;
+    for _ in 0..RELEASE_FRAMES {
+        hanging.step(&[]);
+        highest_j = highest_j.max(energy(&hanging.simulation).total_j());
+    }
+    (hanging.simulation).set_gravity_and_damping(GRAVITY_M_S2, DAMPING_PER_S);
+    hanging.steps(SETTLE_FRAMES);
+    let positions = hanging.simulation.particles();
+    let mut measures = hanging.measures(cell, "Newton statics");
+    measures.not_finite_frame = resting.not_finite_frame.or(measures.not_finite_frame);
+    measures.drift_sizes = finite(resting.farthest_m / body.size_m);
+    if let Some(equilibrium) = equilibrium {
+        let work_j = work_of_gravity_j(body, equilibrium);
+        measures.energy_growth_rel = finite((highest_j - start_j) / work_j);
+        let sag_m = body.tip_of_oracle_m(equilibrium).z;
+        measures.sag_ratio = finite(body.tip_m(positions).z / sag_m);
+        let still: Vec<Vec3> = equilibrium.iter().map(|x| x.as_vec3()).collect();
+        measures.volume_error_rel = volume_error(body, positions, &still);
+    } else {
+        measures.oracle = "no static solution".to_owned();
+        measures.volume_error_rel = volume_error(body, positions, &body.setup.tets.particles);
+    }
+    hanging.row(cell, measures)
+}
+
+/// Σ m g·(x − rest) [J].
+fn work_of_gravity_j(body: &HeldBody, positions: &[DVec3]) -> f64 {
+    let rest = &body.setup.tets.particles;
+    (body.setup.masses_kg.iter().zip(positions).zip(rest))
+        .map(|((&mass, x), rest)| {
+            f64::from(mass) * GRAVITY_M_S2.as_dvec3().dot(*x - rest.as_dvec3())
+        })
+        .sum()
+}
+
+/// Volume over that of `truth`, off by, over the volume at rest.
+fn volume_error(body: &HeldBody, positions: &[Vec3], truth: &[Vec3]) -> Option<f64> {
+    let tets = &body.setup.tets;
+    let volume = |x: &[Vec3]| volume_and_inverted(x, &tets.tets).0;
+    finite(((volume(positions) - volume(truth)) / volume(&tets.particles)).abs())
+}
+
+/// Settled, wrecked, let go.
+pub fn wreck(cell: &Cell, body: &HeldBody) -> Row<Cell, Measures> {
+    let mut watched = Watched::new(cell, body, GRAVITY_M_S2, DAMPING_PER_S);
+    watched.steps(SETTLE_FRAMES);
+    let settled = watched.simulation.particles().to_vec();
+    let tets = &body.setup.tets.tets;
+    let inverted = volume_and_inverted(&settled, tets).1;
+    let mut back_since = None;
+    let mut rms = f64::INFINITY;
+    let is_usable = settled.iter().all(|x| x.is_finite());
+    if is_usable {
+        let wrecked = wrecked(cell, body, &settled);
+        let still = vec![Vec3::ZERO; wrecked.len()];
+        watched.simulation.set_state(&wrecked, &still);
+        for frame in 1..=RECOVER_FRAMES {
+            watched.step(&[]);
+            let positions = watched.simulation.particles();
+            rms = rms_distance_m(positions, &settled) / body.size_m;
+            let is_back = rms < BACK_RMS && volume_and_inverted(positions, tets).1 <= inverted;
+            back_since = back_since.or(Some(frame)).filter(|_| is_back);
+        }
+    }
+    let mut measures = watched.measures(cell, "its own settled state");
+    measures.frames_to_recover = back_since;
+    measures.rms_left_sizes = Some(if rms.is_finite() { rms } else { f64::MAX });
+    // A particle pulled away by ten lengths was not thrown there by the method.
+    let sizes = measures.farthest_sizes;
+    measures.farthest_sizes = sizes.map(|sizes| match cell.start {
+        Start::Pull => (sizes - 10.0).max(0.0),
+        _ => sizes,
+    });
+    watched.row(cell, measures)
+}
+
+/// `settled` with every free particle put where the start of `cell` has it.
+fn wrecked(cell: &Cell, body: &HeldBody, settled: &[Vec3]) -> Vec<Vec3> {
+    let (low, high) = bounds(&body.setup.tets.particles);
+    let middle = (low + high) / 2.0;
+    let mut random = Random::new(u64::from(cell.seed) + 1);
+    let mut x = settled.to_vec();
+    for i in body.free() {
+        match cell.start {
+            Start::Rest | Start::Pull => {}
+            Start::Random => x[i] = random.in_box(low, high),
+            Start::Point => x[i] = middle,
+            Start::Plane => x[i].z = middle.z,
+        }
+    }
+    if cell.start == Start::Pull {
+        let rest = &body.setup.tets.particles;
+        let far = |i: &&usize| rest[**i].element_sum();
+        let corner = body.tip().iter().max_by(|a, b| far(a).total_cmp(&far(b)));
+        let corner = *corner.expect("a body has a tip");
+        x[corner].x += 10.0 * body.size_m as f32;
+    }
+    x
+}
+
+fn rms_distance_m(a: &[Vec3], b: &[Vec3]) -> f64 {
+    let squares = a
+        .iter()
+        .zip(b)
+        .map(|(a, b)| (a.as_dvec3() - b.as_dvec3()).length_squared());
+    (squares.sum::<f64>() / a.len() as f64).sqrt()
+}
+
+/// A ball comes down on the middle of the top, stays a while, and leaves. No gravity.
+pub fn poke(cell: &Cell, body: &HeldBody) -> Row<Cell, Measures> {
+    let (low, high) = bounds(&body.setup.tets.particles);
+    let thickness_m = high.z - low.z;
+    let radius_m = TOOL_RADIUS_SHARE * thickness_m;
+    let way_m = cell.poke_speed_m_s as f32 * cell.timestep_s as f32;
+    let above = Vec3::new(
+        (low.x + high.x) / 2.0,
+        (low.y + high.y) / 2.0,
+        high.z + 1.5 * radius_m,
+    );
+    let deepest = high.z - TOOL_DEPTH_SHARE * thickness_m + radius_m;
+    let tool = |z: f32| ToolInput {
+        shape: ToolShape::Sphere { radius_m },
+        position_m: above.with_z(z),
+        action: ToolAction::Push,
+        friction: FRICTION,
+    };
+    let mut watched = Watched::new(cell, body, Vec3::ZERO, DAMPING_PER_S);
+    let (mut penetration_m, mut force_n) = (0.0_f32, 0.0_f32);
+    let mut go = |watched: &mut Watched, z: f32| {
+        watched.step(&[tool(z)]);
+        let report = watched.simulation.report();
+        penetration_m = penetration_m.max(report.penetration_max_m);
+        force_n = report
+            .tool_forces_n
+            .iter()
+            .map(|f| f.length())
+            .fold(force_n, f32::max);
+    };
+    let down = ((above.z - deepest) / way_m).ceil().max(1.0) as u32;
+    go(&mut watched, above.z);
+    for step in 1..=down {
+        go(&mut watched, (above.z - way_m * step as f32).max(deepest));
+    }
+    for _ in 0..HOLD_FRAMES {
+        go(&mut watched, deepest);
+    }
+    let middle = above.with_z(deepest).as_dvec3();
+    let tunnelled = is_inside(
+        watched.simulation.particles(),
+        &body.setup.tets.tets,
+        middle,
+    );
+    for step in 1..=down {
+        go(&mut watched, (deepest + way_m * step as f32).min(above.z));
+    }
+    watched.steps(AFTER_FRAMES);
+    let mut measures = watched.measures(cell, "invariants");
+    measures.penetration_share = finite(f64::from(penetration_m / thickness_m));
+    measures.tunnelled = Some(tunnelled);
+    measures.force_max_n = finite(f64::from(force_n));
+    let rest = &body.setup.tets.particles;
+    measures.volume_error_rel = volume_error(body, watched.simulation.particles(), rest);
+    watched.row(cell, measures)
+}
+
+/// Whether a place lies in one of the tetrahedra as they are now.
+pub fn is_inside(positions: &[Vec3], tets: &[[u32; 4]], place: DVec3) -> bool {
+    tets.iter().any(|tet| {
+        let [a, b, c, d] = tet.map(|corner| positions[corner as usize].as_dvec3());
+        let edges = DMat3::from_cols(b - a, c - a, d - a);
+        let weights = edges.inverse() * (place - a);
+        weights.min_element() >= 0.0 && weights.element_sum() <= 1.0
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::Method;
+    use crate::study::held_body::{Hold, beam};
+    use crate::study::stability::Mesh;
+    use crate::study::sweep::State;
+
+    fn cell() -> Cell {
+        Cell {
+            method: Method::XpbdNeoHookean,
+            mesh: Mesh::Regular,
+            youngs_modulus_pa: 1e4,
+            poisson_ratio: 0.45,
+            timestep_s: 1.0 / 60.0,
+            substeps: 10,
+            iterations: 1,
+            poke_speed_m_s: 0.0,
+            start: Start::Rest,
+            seed: 0,
+        }
+    }
+
+    fn small_beam(hold: Hold) -> HeldBody {
+        HeldBody::new(beam(2), 1000.0, hold)
+    }
+
+    #[test]
+    fn hanging_beam_is_compared_with_what_it_should_be() {
+        let body = small_beam(Hold::End);
+        let tissue = crate::study::oracle::Tissue {
+            youngs_modulus_pa: 1e4,
+            poisson_ratio: 0.45,
+        };
+        let truth = crate::study::oracle::settled_m(&body, tissue).expect("it comes to rest");
+        let row = hang(&cell(), &body, Some(&truth));
+        let sag = row.measures.sag_ratio.expect("it sags");
+        // Ten substeps on a coarse mesh are within some percent; half the truth is seen at once.
+        assert!((0.9..1.1).contains(&sag), "{sag}");
+        let half: Vec<DVec3> = (truth.iter().zip(&body.setup.tets.particles))
+            .map(|(x, rest)| (*x + rest.as_dvec3()) / 2.0)
+            .collect();
+        let row = hang(&cell(), &body, Some(&half));
+        assert!(row.measures.sag_ratio.expect("it sags") > 1.8);
+        assert_eq!(
+            row.measures.fault,
+            Some(Fault::TooSoft),
+            "{}",
+            row.verdict.why
+        );
+    }
+
+    #[test]
+    fn springs_with_too_long_a_substep_fail() {
+        let explosive = Cell {
+            method: Method::MassSpring,
+            youngs_modulus_pa: 1e6,
+            substeps: 1,
+            ..cell()
+        };
+        let row = hang(&explosive, &small_beam(Hold::End), None);
+        assert_eq!(row.verdict.state, State::Failed, "{}", row.verdict.why);
+    }
+
+    #[test]
+    fn pulled_beam_is_back_after_some_frames_and_not_at_once() {
+        let pulled = Cell {
+            start: Start::Pull,
+            ..cell()
+        };
+        let row = wreck(&pulled, &small_beam(Hold::End));
+        let frames = row.measures.frames_to_recover.expect(&row.verdict.why);
+        assert!(frames > 1, "{frames}");
+    }
+
+    #[test]
+    fn pushed_tool_meets_a_force_and_a_place_inside_is_told_from_one_outside() {
+        let body = small_beam(Hold::Foot);
+        let poked = Cell {
+            poke_speed_m_s: 0.5,
+            ..cell()
+        };
+        let row = poke(&poked, &body);
+        assert!(row.measures.force_max_n.expect("finite") > 0.0);
+        let tets = &body.setup.tets;
+        assert!(is_inside(&tets.particles, &tets.tets, DVec3::splat(0.03)));
+        assert!(!is_inside(&tets.particles, &tets.tets, DVec3::splat(0.07)));
+    }
+
+    #[test]
+    fn starts_are_what_they_say_and_hold_what_is_held() {
+        let body = small_beam(Hold::End);
+        let rest = body.setup.tets.particles.clone();
+        for start in Start::ALL {
+            let x = wrecked(&Cell { start, ..cell() }, &body, &rest);
+            let moved = (0..x.len()).filter(|&i| x[i] != rest[i]).count();
+            let free = body.free().count();
+            match start {
+                Start::Rest => assert_eq!(moved, 0),
+                Start::Pull => assert_eq!(moved, 1),
+                // Some are in the middle already.
+                Start::Random | Start::Point | Start::Plane => {
+                    assert!(moved > free / 2 && moved <= free, "{start:?}: {moved}");
+                }
+            }
+            assert!((0..x.len()).all(|i| !body.setup.fixed[i] || x[i] == rest[i]));
+        }
+    }
+}
