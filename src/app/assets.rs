@@ -46,6 +46,7 @@ const SCENES: &[(&str, &str)] = &[
     ("beam", include_str!("../../scenes/beam.toml")),
     ("organ-tets", include_str!("../../scenes/organ-tets.toml")),
     ("hanging-bar", include_str!("../../scenes/hanging-bar.toml")),
+    ("hertz", include_str!("../../scenes/hertz.toml")),
 ];
 
 /// The scene of a window that was told none.

@@ -103,6 +103,7 @@ impl Recording {
             residual_rms: tick.report.residual_rms,
             volume_drift: tick.report.volume_drift,
             tool_force_n: tick.force_max_n(),
+            tool_depth_m: session.tool_depth_m(),
             penetration_m: tick.report.penetration_max_m,
             speed_max_m_s: tick.report.speed_max_m_s,
         });

@@ -17,6 +17,8 @@ struct ScriptedTool {
     shape: ToolShape,
     friction: f32,
     keys: Vec<PlacedKey>,
+    /// First touch of the surface at rest and the unit direction to it, if the tool has an approach.
+    ray: Option<(Vec3, Vec3)>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +59,7 @@ impl Script {
                         },
                     },
                     friction: tool.friction,
+                    ray,
                     keys: tool
                         .keys
                         .iter()
@@ -75,6 +78,16 @@ impl Script {
     /// The tools as they are at `time_s`.
     pub fn at(&self, time_s: f32) -> Vec<ToolInput> {
         self.tools.iter().map(|tool| tool.at(time_s)).collect()
+    }
+
+    /// How deep the front of the first tool with an approach is below the surface at rest [m],
+    /// negative above it; `None` if there is no such tool.
+    pub fn depth_m(&self, time_s: f32) -> Option<f32> {
+        self.tools.iter().find_map(|tool| {
+            let (touch, direction) = tool.ray?;
+            let way = tool.at(time_s).position_m - touch;
+            Some(way.dot(direction) + tool.shape.radius_m())
+        })
     }
 }
 
@@ -138,6 +151,7 @@ mod tests {
         ScriptedTool {
             shape: ToolShape::Sphere { radius_m: 0.01 },
             friction: 0.0,
+            ray: None,
             keys: vec![
                 key(1.0, 0.0, ToolAction::Push),
                 key(2.0, 1.0, ToolAction::Grab),
@@ -156,6 +170,28 @@ mod tests {
     fn a_tool_does_what_its_last_key_says() {
         assert_eq!(tool().at(1.99).action, ToolAction::Push);
         assert_eq!(tool().at(2.0).action, ToolAction::Grab);
+    }
+
+    #[test]
+    fn the_depth_is_that_of_the_front_below_the_first_touch() {
+        // Moves along x, towards a surface that it meets at x = 0.31.
+        let script = Script {
+            tools: vec![
+                tool(),
+                ScriptedTool {
+                    ray: Some((0.31 * Vec3::X, Vec3::X)),
+                    ..tool()
+                },
+            ],
+        };
+        for (time_s, depth_m) in [(0.0, -0.3), (1.25, -0.05), (2.0, 0.7)] {
+            let depth = script.depth_m(time_s).expect("a tool has an approach");
+            assert!((depth - depth_m).abs() < 1e-6, "{depth} at {time_s} s");
+        }
+        let without = Script {
+            tools: vec![tool()],
+        };
+        assert_eq!(without.depth_m(1.0), None);
     }
 
     #[test]

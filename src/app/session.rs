@@ -116,6 +116,12 @@ impl Session {
         tools
     }
 
+    /// How deep the front of the first scripted tool with an approach is below the surface at rest
+    /// [m]; `None` without such a tool.
+    pub fn tool_depth_m(&self) -> Option<f32> {
+        self.script.depth_m(self.time_s())
+    }
+
     /// The tools that can be seen: those of a script that plays, and a hand that does something.
     pub fn visible_tools(&self) -> Vec<DrawnTool> {
         let tools = self.tools_now();

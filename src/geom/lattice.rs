@@ -6,11 +6,13 @@
 
 mod block;
 mod embed;
+mod graded;
 mod inside;
 mod sphere;
 
 pub use block::{block, block_of_cells};
 pub use embed::{boundary_triangles, embed};
+pub use graded::graded_block;
 pub use sphere::sphere;
 
 use super::{Embedding, SurfaceMesh, TetMesh};

@@ -26,6 +26,9 @@ pub struct FrameRecord {
     pub volume_drift: f32,
     /// Force on the tools together [N].
     pub tool_force_n: f32,
+    /// How deep the front of the first scripted tool is below the surface at rest [m], negative
+    /// above it; `None` if no tool has a way to the surface.
+    pub tool_depth_m: Option<f32>,
     /// Deepest penetration of tissue into a tool [m].
     pub penetration_m: f32,
     /// Speed of the fastest particle [m/s].
@@ -50,6 +53,7 @@ pub fn pass_names(records: &[FrameRecord]) -> Vec<&'static str> {
 /// [`FileError::Write`].
 pub fn write_frames_csv(file: &Path, records: &[FrameRecord]) -> Result<(), FileError> {
     let passes = pass_names(records);
+    let has_depth = records.iter().any(|record| record.tool_depth_m.is_some());
     write_with(file, |out| {
         let mut table = csv::Writer::from_writer(out);
         let before = ["frame", "time_s", "wall_ms", "sim_ms"];
@@ -65,9 +69,16 @@ pub fn write_frames_csv(file: &Path, records: &[FrameRecord]) -> Result<(), File
         let mut header: Vec<String> = before.map(str::to_owned).to_vec();
         header.extend(passes.iter().map(|pass| format!("{pass}_gpu_ms")));
         header.extend(after.map(str::to_owned));
+        if has_depth {
+            header.push("tool_depth_m".to_owned());
+        }
         table.write_record(&header)?;
         for record in records {
-            table.write_record(row(record, &passes))?;
+            let mut row = row(record, &passes);
+            if has_depth {
+                row.push(record.tool_depth_m.map_or(String::new(), |d| d.to_string()));
+            }
+            table.write_record(row)?;
         }
         table.flush()
     })
@@ -129,6 +140,20 @@ mod tests {
              0,0.000000,0,0,0.5,,0,0,0,0,0,0,0\n\
              1,0.016667,0,0,0.25,2,0,0,0,0,1.5,0,0\n"
         );
+    }
+
+    #[test]
+    fn depth_is_the_last_column_of_a_log_that_has_one() {
+        let record = FrameRecord {
+            tool_depth_m: Some(0.25),
+            ..FrameRecord::default()
+        };
+        let log = csv(&[FrameRecord::default(), record]);
+        let ends: Vec<&str> = (log.lines())
+            .map(|line| line.rsplit(',').next().expect("a line has a word"))
+            .collect();
+        assert_eq!(ends, ["tool_depth_m", "", "0.25"]);
+        assert!(!csv(&[FrameRecord::default()]).contains("depth"));
     }
 
     #[test]

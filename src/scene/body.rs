@@ -26,7 +26,7 @@ pub struct BodySection {
     /// Longest extent of the file's body [m]; left out, the file's units are metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size_m: Option<f32>,
-    /// Edge of a lattice cell [m]; left out, it follows from the volume and a budget of tetrahedra.
+    /// Edge of a lattice cell [m], of a graded slab the finest; left out, it follows from the volume and a budget of tetrahedra.
     /// Not for tetrahedra from a file, which are the cells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cell_m: Option<f32>,
@@ -63,6 +63,9 @@ pub enum Shape {
     Beam,
     /// A ball.
     Sphere,
+    /// A box below the origin, whose cells are finest there, in the middle of its top (y = max), and
+    /// grow with the distance: for a tool that presses it there.
+    GradedSlab,
 }
 
 /// The texture maps of a surface, as files.

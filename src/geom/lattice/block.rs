@@ -69,7 +69,7 @@ pub fn block_of_cells(size_m: Vec3, cells: [usize; 3]) -> (SurfaceMesh, Lattice)
     for particle in &mut tets.particles {
         *particle = (particle.as_dvec3() * cell).as_vec3();
     }
-    let (surface, carriers) = skin(&tets, size_m);
+    let (surface, carriers) = skin(&tets, Vec3::ZERO, size_m);
     let fill = vec![1.0; tets.tets.len()];
     let lattice = Lattice {
         masses_kg: masses_kg(&tets, &fill, size_m.as_dvec3().element_product()),
@@ -84,8 +84,8 @@ pub fn block_of_cells(size_m: Vec3, cells: [usize; 3]) -> (SurfaceMesh, Lattice)
     (surface, lattice)
 }
 
-/// The surface of a box, and the particle of each of its points.
-fn skin(tets: &TetMesh, size_m: Vec3) -> (SurfaceMesh, Vec<u32>) {
+/// The surface of a box from `low` on, and the particle of each of its points.
+pub(super) fn skin(tets: &TetMesh, low: Vec3, size_m: Vec3) -> (SurfaceMesh, Vec<u32>) {
     let mut surface = SurfaceMesh::default();
     let mut carriers = Vec::new();
     let mut point_of_particle = HashMap::new();
@@ -102,7 +102,7 @@ fn skin(tets: &TetMesh, size_m: Vec3) -> (SurfaceMesh, Vec<u32>) {
                     surface.points.len() as u32 - 1
                 });
                 surface.point_of.push(point);
-                surface.uvs.push(side.uv(place, size_m));
+                surface.uvs.push(side.uv(place - low, size_m));
                 surface.uvs.len() as u32 - 1
             })
         }));
