@@ -22,7 +22,7 @@ pub use near::{Surface, SweptBox};
 
 use super::{ToolShape, handle::Handle};
 use glam::{Vec3, Vec4};
-use near::{Near, Vicinity};
+use near::{Feature, Near, Vicinity};
 use nearest::{Axis, Nearest, blend, nearest};
 use sweep::sweep;
 use touch::Touch;
@@ -155,14 +155,18 @@ impl Contacts {
             self.side = if inside { Side::Inside } else { Side::Outside };
         }
         if self.side == Side::Inside {
-            self.vicinity.find_way_out(from_m, surface, places);
+            let radius_m = shape.radius_m();
+            (self.vicinity).find_way_out(radius_m, from_m, surface, places);
         }
         // Both lists are in the order of the surface.
         let mut near = (self.vicinity.near.iter().zip(0..)).peekable();
-        self.touches.sort_unstable_by_key(|touch| touch.key);
+        self.touches.sort_unstable_by_key(|touch| touch.feature);
         self.touches.retain_mut(|touch| {
-            while near.next_if(|(near, _)| near.key < touch.key).is_some() {}
-            let found = near.next_if(|(near, _)| near.key == touch.key);
+            while near
+                .next_if(|(near, _)| near.feature < touch.feature)
+                .is_some()
+            {}
+            let found = near.next_if(|(near, _)| near.feature == touch.feature);
             touch.near = found.map_or(0, |(_, index)| index);
             found.is_some()
         });
@@ -179,13 +183,14 @@ impl Contacts {
     }
 
     /// Pushes as in the last substep, before anything else does: what rests is pushed by the right
-    /// amount then, and the elastic constraints answer to it as they do to gravity.
-    pub fn press_on(&mut self, tool: Motion, places: &mut [Vec4]) {
+    /// amount then, and the elastic constraints answer to it as they do to gravity. `scale` is h²
+    /// over that of the last substep.
+    pub fn press_on(&mut self, tool: Motion, scale: f32, places: &mut [Vec4]) {
         let farthest_m = (self.touches.iter())
-            .map(|touch| touch.guess.length() * touch.handle.inverse_mass)
+            .map(|touch| scale * touch.guess.length() * touch.handle.inverse_mass)
             .fold(0.0, f32::max);
         // In long substeps the guess is no small push, and what it moves far is not at rest.
-        let share = (PRESS_ON_RADII * tool.shape.radius_m() / farthest_m).min(1.0);
+        let share = scale * (PRESS_ON_RADII * tool.shape.radius_m() / farthest_m).min(1.0);
         for touch in &mut self.touches {
             touch.push_guess(share, tool.friction, places);
         }
@@ -250,7 +255,6 @@ impl Contacts {
     /// Looks where the surface is now, and brings the touches up to date. Places up to `margin_m`
     /// away are taken too.
     pub fn look(&mut self, tool: Motion, places: &[Vec4], substep_s: f32, margin_m: f32) {
-        let radius = tool.shape.radius_m();
         let leave_m = DEPENETRATION_SPEED_M_S * substep_s;
         let inside = self.side == Side::Inside;
         let Vicinity {
@@ -275,8 +279,8 @@ impl Contacts {
             let start = corners.map(|corner| corner.start);
             let end = corners.map(|corner| corner.end);
             let seen = Seen {
-                axis: near.axis(tool.shape),
-                radius_m: radius,
+                axis: near.feature.axis(tool.shape),
+                radius_m: near.radius_m,
                 start,
                 end,
                 way_m,
@@ -289,19 +293,25 @@ impl Contacts {
                 seen.from_outside(near, known)
             };
             let Some(found) = found else { continue };
+            // Corners are held for themselves.
+            let at_corner = found.weights.max_element() == 1.0;
+            let is_point = matches!(near.feature, Feature::Point { .. });
+            if at_corner && !is_point && !inside && near.touch.is_none() {
+                continue;
+            }
             let carriers = near.carriers(carriers, corners);
             let handle = carriers.at(found.weights, places);
             if handle.inverse_mass <= 0.0 {
                 continue;
             }
             let touch = Touch {
-                key: near.key,
+                feature: near.feature,
                 near: index as u32,
                 handle,
                 normal: found.normal,
                 foot: found.foot,
                 start: blend(found.weights, start),
-                target_m: (found.start_gap_m + leave_m).min(0.0),
+                radius_m: near.radius_m + (found.start_gap_m + leave_m).min(0.0),
                 multiplier: Vec3::ZERO,
                 guess: Vec3::ZERO,
             };
@@ -356,7 +366,7 @@ impl Contacts {
                 let index = self.vicinity.points[k as usize].point;
                 points[index as usize] - position_m
             });
-            let found = nearest(near.axis(shape), corners);
+            let found = nearest(near.feature.axis(shape), corners);
             if self.side == Side::Inside && found.normal(corners).dot(outwards(corners)) > 0.0 {
                 radius + found.distance_m()
             } else {

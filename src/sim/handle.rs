@@ -5,9 +5,12 @@ use glam::{Vec3, Vec4};
 
 /// Carriers of a place in a triangle: three points of four particles each.
 const CARRIERS_MAX: usize = 12;
-/// No particle is moved by more than this many times what its place is moved: beside held
+/// No particle is moved by more than this many times what is asked of its place: beside held
 /// particles a place has little that can move, and a push through it would fling that away.
 const LEVER_MAX: f32 = 4.0;
+
+/// A place of which less than this share can move counts as held.
+const MOVING_SHARE_MIN: f32 = 0.1;
 
 /// Particles that carry a place, and what they are worth together.
 #[derive(Clone, Copy, Debug)]
@@ -15,9 +18,11 @@ pub struct Handle {
     count: u8,
     particles: [u32; CARRIERS_MAX],
     weights: [f32; CARRIERS_MAX],
-    /// Σ weight² · inverse mass [1/kg], or a little more where only a small share of the place can
-    /// move; 0 if none of it can.
+    /// Σ weight² · inverse mass [1/kg]; 0 for a place that is held.
     pub inverse_mass: f32,
+    /// A compliance that adds to it where only a small share of the place can move [1/kg]: what is
+    /// asked of the place is then done in part.
+    pub give: f32,
 }
 
 impl Handle {
@@ -28,7 +33,7 @@ impl Handle {
         for k in 0..4 {
             handle.add(particles[k], weights[k]);
         }
-        handle.inverse_mass = handle.inverse_mass_of(places);
+        handle.weigh(places);
         handle
     }
 
@@ -38,6 +43,7 @@ impl Handle {
         particles: [0; CARRIERS_MAX],
         weights: [0.0; CARRIERS_MAX],
         inverse_mass: 0.0,
+        give: 0.0,
     };
 
     /// Lets `particle` carry `weight` more.
@@ -52,14 +58,21 @@ impl Handle {
         self.count += u8::from(known.is_none());
     }
 
-    fn inverse_mass_of(&self, places: &[Vec4]) -> f32 {
-        let (mut sum, mut largest) = (0.0_f32, 0.0_f32);
+    fn weigh(&mut self, places: &[Vec4]) {
+        let (mut sum, mut largest, mut moving) = (0.0_f32, 0.0_f32, 0.0_f32);
         for (particle, weight) in self.carriers() {
             let moved = places[particle as usize].w * weight;
             sum += moved * weight;
             largest = largest.max(moved.abs());
+            if moved != 0.0 {
+                moving += weight;
+            }
         }
-        sum.max(largest / LEVER_MAX)
+        if moving.abs() < MOVING_SHARE_MIN {
+            return;
+        }
+        self.inverse_mass = sum;
+        self.give = (largest / LEVER_MAX - sum).max(0.0);
     }
 
     /// Where the place is now [m].
@@ -127,7 +140,7 @@ impl TriangleCarriers {
                 + weights.y * self.corners[1][j]
                 + weights.z * self.corners[2][j];
         }
-        handle.inverse_mass = handle.inverse_mass_of(places);
+        handle.weigh(places);
         handle
     }
 }

@@ -93,6 +93,14 @@ impl Particles {
         frozen
     }
 
+    /// Longest way of a particle since the step started [m].
+    pub fn way_max_m(&self) -> f32 {
+        (self.places.iter().zip(&self.finite))
+            .map(|(now, then)| (*now - *then).truncate().length_squared())
+            .fold(0.0, f32::max)
+            .sqrt()
+    }
+
     /// Fastest particle [m/s].
     pub fn speed_max_m_s(&self) -> f32 {
         self.velocities

@@ -14,7 +14,7 @@ use crate::geom::bounds;
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// A body slower than this many of its sizes a second is calm.
+/// A body that moves in a step by less than this many of its sizes a second is calm.
 const CALM_SIZES_PER_S: f32 = 5e-4;
 /// So many calm steps in a row put it to sleep: half a second, longer than it hangs still at the
 /// turning point of a swing.
@@ -335,7 +335,9 @@ impl Simulation {
         self.publish();
         let (volume, inverted_tets) = volume_and_inverted(&self.positions, &self.sound_tets);
         let speed_max_m_s = self.particles.speed_max_m_s();
-        let calm = !stirred && speed_max_m_s < CALM_SIZES_PER_S * self.size_m;
+        // By the way in the step: where something presses, light particles tremble by rounding.
+        let way_m = self.particles.way_max_m();
+        let calm = !stirred && way_m < CALM_SIZES_PER_S * self.size_m * self.solver.timestep_s;
         self.calm_steps = if calm { self.calm_steps + 1 } else { 0 };
         self.report = StepReport {
             residual_rms,
@@ -364,7 +366,8 @@ impl Simulation {
         self.particles
             .predict(team, self.setup.gravity_m_s2, accelerations, substep_s);
         self.tools.begin_substep(&self.particles, from);
-        self.tools.press_on(&mut self.particles, from, to);
+        self.tools
+            .press_on(&mut self.particles, from, to, substep_s);
         for _ in 0..self.solver.iterations {
             (self.model).project(team, &mut self.particles.places, &self.solver);
             self.tools.solve(&mut self.particles, from, to, substep_s);

@@ -43,6 +43,8 @@ pub struct Tools {
     tools: Vec<Tool>,
     /// Whether a tool that touched or held the body is no longer there.
     gone: bool,
+    /// Length of the last substep [s], 0 before the first.
+    last_substep_s: f32,
 }
 
 /// The body as the tools meet it at the start of a step.
@@ -128,10 +130,16 @@ impl Tools {
     }
 
     /// Lets tools that pressed in the last substep press on, before anything else answers.
-    pub fn press_on(&mut self, particles: &mut Particles, from: f32, to: f32) {
+    pub fn press_on(&mut self, particles: &mut Particles, from: f32, to: f32, substep_s: f32) {
+        let last_s = std::mem::replace(&mut self.last_substep_s, substep_s);
+        let scale = if last_s > 0.0 {
+            (substep_s / last_s).powi(2)
+        } else {
+            1.0
+        };
         for tool in &mut self.tools {
             let motion = tool.motion(from, to);
-            tool.contacts.press_on(motion, &mut particles.places);
+            (tool.contacts).press_on(motion, scale, &mut particles.places);
         }
     }
 

@@ -8,6 +8,21 @@ use crate::geom::Embedding;
 use crate::sim::handle::TriangleCarriers;
 use glam::{Vec3, Vec4};
 
+/// Most that a triangle may dip into a tool, over its radius.
+const DIP_RADII_MAX: f32 = 0.005;
+
+/// How far a triangle may dip into a tool of this radius [m].
+///
+/// Triangles are flat where a tool is round. One of edges e that rests on its corners dips into the
+/// tool by Σ e²/24R in the mean and by about Σ e²/16R at most. So that the surface is in its right
+/// place on average, and the force does not depend on the mesh, corners are held off by the mean;
+/// the rest, Σ e²/48R, is what the deepest place may dip. But little: a triangle that is large for
+/// the tool is held where it dips.
+fn dip_m(radius_m: f32, [a, b, c]: [Vec3; 3]) -> f32 {
+    let squares = (b - a).length_squared() + (c - b).length_squared() + (a - c).length_squared();
+    (squares / (48.0 * radius_m)).min(DIP_RADII_MAX * radius_m)
+}
+
 /// The surface of the body as a step finds it.
 #[derive(Clone, Copy)]
 pub struct Surface<'a> {
@@ -65,6 +80,8 @@ pub struct NearPoint {
     pub end: Vec3,
     /// From start to end [m].
     pub way_m: f32,
+    /// How far it is held off the tool for the sake of its triangles [m].
+    off_m: f32,
 }
 
 impl NearPoint {
@@ -79,14 +96,41 @@ impl NearPoint {
     }
 }
 
-/// A triangle near a piece of the tool.
+/// What of the surface touches what of the tool.
+///
+/// A flat part of the surface under a large tool rests on its points: of a triangle only one place
+/// is held, and on that alone it would rock. Triangles come in where the tool is smaller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Feature {
+    /// A point of the surface and the whole axis.
+    Point { point: u32 },
+    /// A triangle and one half of a capsule's axis, which may lie along a triangle larger than
+    /// itself; spheres have the first only.
+    Triangle { half: u8, triangle: u32 },
+}
+
+impl Feature {
+    /// Its part of the axis, in the frame of the tool [m].
+    #[inline]
+    pub fn axis(self, shape: ToolShape) -> Axis {
+        let axis = shape.axis_m();
+        match self {
+            Self::Point { .. } => [Vec3::ZERO, axis],
+            Self::Triangle { half: 0, .. } => [Vec3::ZERO, 0.5 * axis],
+            Self::Triangle { .. } => [0.5 * axis, axis],
+        }
+    }
+}
+
+/// A feature of the surface near the tool.
 #[derive(Clone, Copy, Debug)]
 pub struct Near {
-    /// Its index in the surface, and which half of a capsule's axis it is near.
-    pub key: (u32, u8),
-    /// Its corners, as indices of near points.
+    pub feature: Feature,
+    /// Its corners, as indices of near points; for a point three times the same.
     pub corners: [u32; 3],
-    /// At least so far outside the tool when the substep started [m].
+    /// How near it may come to the axis [m].
+    pub radius_m: f32,
+    /// At least so much farther it was when the substep started [m].
     pub clear_m: f32,
     /// Its touch in this substep.
     pub touch: Option<u32>,
@@ -95,15 +139,6 @@ pub struct Near {
 }
 
 impl Near {
-    /// Its piece of the axis, in the frame of the tool [m].
-    ///
-    /// A capsule has two: it can lie along a triangle larger than itself, and one place would let it
-    /// rock.
-    #[inline]
-    pub fn axis(&self, shape: ToolShape) -> Axis {
-        piece_axis(shape, self.key.1)
-    }
-
     /// Its carriers, from `all` that have been needed so far.
     pub fn carriers(
         &mut self,
@@ -119,18 +154,10 @@ impl Near {
     }
 }
 
-fn piece_axis(shape: ToolShape, piece: u8) -> Axis {
-    let half = 0.5 * shape.axis_m();
-    match shape {
-        ToolShape::Sphere { .. } => [Vec3::ZERO; 2],
-        ToolShape::Capsule { .. } => [f32::from(piece) * half, f32::from(piece + 1) * half],
-    }
-}
-
-/// All triangles near a tool.
+/// All features near a tool.
 #[derive(Clone, Debug, Default)]
 pub struct Vicinity {
-    /// In the order of their keys.
+    /// In the order of their features.
     pub near: Vec<Near>,
     pub points: Vec<NearPoint>,
     pub carriers: Vec<TriangleCarriers>,
@@ -149,46 +176,58 @@ impl Vicinity {
         self.carriers.clear();
     }
 
-    /// Lists the triangles whose boxes meet `swept` and that it can reach.
+    /// Lists the features that a tool can reach in a step in which it goes from `from_m` on and
+    /// sweeps `swept`.
     pub fn find(&mut self, shape: ToolShape, from_m: Vec3, swept: SweptBox, surface: Surface) {
         self.clear();
         self.beyond.clear();
         self.beyond
             .extend(surface.points.iter().map(|&x| swept.beyond(x)));
-        self.near_of.resize(surface.points.len(), NONE);
-        let pieces = match shape {
+        let halves = match shape {
             ToolShape::Sphere { .. } => 1,
             ToolShape::Capsule { .. } => 2,
         };
-        for (index, triangle) in surface.triangles.iter().enumerate() {
-            let [a, b, c] = triangle.map(|point| self.beyond[point as usize]);
-            if a & b & c != 0 {
-                continue;
-            }
-            for piece in 0..pieces {
-                self.add((index as u32, piece), shape, from_m, surface);
-                if self
-                    .near
-                    .last()
-                    .is_some_and(|near| near.clear_m > swept.reach_m)
-                {
-                    self.near.pop();
+        for half in 0..halves {
+            for (index, corners) in surface.triangles.iter().enumerate() {
+                let [a, b, c] = corners.map(|point| self.beyond[point as usize]);
+                if a & b & c == 0 {
+                    let triangle = index as u32;
+                    let feature = Feature::Triangle { half, triangle };
+                    self.add(feature, *corners, shape, from_m, swept.reach_m, surface);
                 }
             }
         }
-        for point in &self.points {
-            self.near_of[point.point as usize] = NONE;
+        for k in 0..self.points.len() {
+            let point = self.points[k].point;
+            let feature = Feature::Point { point };
+            self.add(feature, [point; 3], shape, from_m, swept.reach_m, surface);
         }
+        self.close();
     }
 
+    /// Takes a feature if it is within `reach_m` of the tool.
     fn add(
         &mut self,
-        (triangle, piece): (u32, u8),
+        feature: Feature,
+        corners: [u32; 3],
         shape: ToolShape,
         from_m: Vec3,
+        reach_m: f32,
         surface: Surface,
     ) {
-        let corners = surface.triangles[triangle as usize].map(|point| {
+        let places = corners.map(|point| surface.points[point as usize] - from_m);
+        let dip_m = dip_m(shape.radius_m(), places);
+        let off_m = match feature {
+            Feature::Point { point } => self.points[self.near_of[point as usize] as usize].off_m,
+            Feature::Triangle { .. } => -dip_m,
+        };
+        let radius_m = shape.radius_m() + off_m;
+        let clear_m = nearest(feature.axis(shape), places).distance_m() - radius_m;
+        if clear_m > reach_m {
+            return;
+        }
+        self.near_of.resize(surface.points.len(), NONE);
+        let corners = corners.map(|point| {
             let known = &mut self.near_of[point as usize];
             if *known == NONE {
                 *known = self.points.len() as u32;
@@ -200,49 +239,53 @@ impl Vicinity {
                     start,
                     end: start,
                     way_m: 0.0,
+                    off_m: 0.0,
                 });
             }
+            let near = &mut self.points[*known as usize];
+            near.off_m = near.off_m.max(2.0 * dip_m);
             *known
         });
-        let places = corners.map(|k| self.points[k as usize].start);
-        let near = nearest(piece_axis(shape, piece), places);
         self.near.push(Near {
-            key: (triangle, piece),
+            feature,
             corners,
-            clear_m: near.distance_m() - shape.radius_m(),
+            radius_m,
+            clear_m,
             touch: None,
             carriers: None,
         });
     }
 
+    /// Sorts what has been added.
+    fn close(&mut self) {
+        self.near.sort_unstable_by_key(|near| near.feature);
+        for point in &self.points {
+            self.near_of[point.point as usize] = NONE;
+        }
+    }
+
     /// Lists only the triangle that is nearest to a tip inside the body and can move.
-    pub fn find_way_out(&mut self, tip_m: Vec3, surface: Surface, places: &[Vec4]) {
+    pub fn find_way_out(&mut self, radius_m: f32, tip_m: Vec3, surface: Surface, places: &[Vec4]) {
         self.clear();
         let moves = |triangle: &[u32; 3]| {
-            let carriers = triangle
-                .iter()
-                .flat_map(|&point| surface.embedding.particles[point as usize]);
-            carriers
-                .into_iter()
+            (triangle.iter())
+                .flat_map(|&point| surface.embedding.particles[point as usize])
                 .any(|particle| places[particle as usize].w > 0.0)
         };
         let squared_m2 = |triangle: &[u32; 3]| {
             let corners = triangle.map(|point| surface.points[point as usize]);
             nearest([tip_m; 2], corners).offset.length_squared()
         };
-        let way_out = (surface.triangles.iter().enumerate())
-            .filter(|(_, triangle)| moves(triangle))
-            .map(|(index, triangle)| (index, squared_m2(triangle)))
-            .min_by(|(_, a), (_, b)| a.total_cmp(b));
-        if let Some((index, _)) = way_out {
-            self.near_of.resize(surface.points.len(), NONE);
-            let shape = ToolShape::Sphere { radius_m: 0.0 };
-            self.add((index as u32, 0), shape, tip_m, surface);
+        let way_out = (surface.triangles.iter().zip(0..))
+            .filter(|(corners, _)| moves(corners))
+            .min_by(|(a, _), (b, _)| squared_m2(a).total_cmp(&squared_m2(b)));
+        if let Some((corners, triangle)) = way_out {
+            let feature = Feature::Triangle { half: 0, triangle };
+            let tip = ToolShape::Sphere { radius_m };
+            self.add(feature, *corners, tip, tip_m, f32::INFINITY, surface);
             self.near[0].clear_m = f32::NEG_INFINITY;
-            for point in &self.points {
-                self.near_of[point.point as usize] = NONE;
-            }
         }
+        self.close();
     }
 
     /// Takes over where the points are at the start of a substep.

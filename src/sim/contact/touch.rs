@@ -1,15 +1,14 @@
 //! A place of the surface that touches a tool in a substep.
 
-use super::{Handle, Motion};
+use super::{Handle, Motion, near::Feature};
 use glam::{Vec3, Vec4};
 
 /// One inequality: the place stays outside the tangent plane of the tool, and friction holds it
 /// back along that plane.
 #[derive(Clone, Copy, Debug)]
 pub struct Touch {
-    /// Its triangle and piece of the axis.
-    pub key: (u32, u8),
-    /// The same as an index in the vicinity.
+    pub feature: Feature,
+    /// The feature's index in the vicinity.
     pub near: u32,
     pub handle: Handle,
     /// From the axis towards the place, of length 1.
@@ -18,8 +17,8 @@ pub struct Touch {
     pub foot: Vec3,
     /// The place at the start of the substep, in the frame of the tool [m].
     pub start: Vec3,
-    /// The gap that is asked for [m]: 0, or less for a place that was deep inside.
-    pub target_m: f32,
+    /// How near the place may come to the tangent plane of the axis [m].
+    pub radius_m: f32,
     /// What has been pushed so far [kg m]: never towards the tool, and along the tangent plane no
     /// more than friction allows.
     pub multiplier: Vec3,
@@ -31,12 +30,12 @@ impl Touch {
     /// How far the place is outside the tool, less what is asked for [m].
     #[allow(dead_code, reason = "for solvers that find all multipliers at once")]
     pub fn gap_m(&self, tool: Motion, places: &[Vec4]) -> f32 {
-        self.gap_at(tool, self.handle.place(places) - tool.to_m)
+        self.gap_at(self.handle.place(places) - tool.to_m)
     }
 
     #[inline]
-    fn gap_at(&self, tool: Motion, end: Vec3) -> f32 {
-        self.normal.dot(end - self.foot) - tool.shape.radius_m() - self.target_m
+    fn gap_at(&self, end: Vec3) -> f32 {
+        self.normal.dot(end - self.foot) - self.radius_m
     }
 
     /// How far the place has slid along the tool in this substep [m].
@@ -71,13 +70,19 @@ impl Touch {
     pub fn solve(&mut self, tool: Motion, places: &mut [Vec4]) -> f32 {
         let end = self.handle.place(places) - tool.to_m;
         let (pushed, held) = self.split(self.multiplier);
-        let pushed = (pushed - self.gap_at(tool, end) / self.handle.inverse_mass).max(0.0);
+        let (give, inverse) = (self.handle.give, self.inverse());
+        let pushed = (pushed - inverse * (self.gap_at(end) + give * pushed)).max(0.0);
         // Coulomb: stick if the force of friction allows it. The push leaves the tangent alone.
         let slip = end - self.start;
         let slip = slip - self.normal.dot(slip) * self.normal;
-        let held =
-            (held - slip / self.handle.inverse_mass).clamp_length_max(tool.friction * pushed);
+        let held = (held - inverse * (slip + give * held)).clamp_length_max(tool.friction * pushed);
         self.push_to(pushed * self.normal + held, places)
+    }
+
+    /// What a multiplier grows by for each metre that is missing [kg].
+    #[inline]
+    fn inverse(&self) -> f32 {
+        1.0 / (self.handle.inverse_mass + self.handle.give)
     }
 
     /// A multiplier along the normal and across it.
