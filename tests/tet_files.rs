@@ -360,6 +360,30 @@ fn what_is_wrong_is_refused_with_its_line_and_the_word() {
 }
 
 #[test]
+fn a_description_says_what_the_file_holds_a_line_a_fact() {
+    let folder = std::env::temp_dir().join(format!("palpate-describe-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a temporary folder");
+    let path = folder.join("cube.msh");
+    let mut written = cube();
+    written.elements.push((6, 2, vec![10, 20, 30]));
+    written.elements[1].2.swap(0, 1);
+    std::fs::write(&path, written.format_4()).expect("it can be written");
+    let text = describe(&path).expect("it is sound");
+    std::fs::remove_dir_all(&folder).expect("it can be removed");
+    for fact in [
+        "format: Gmsh 4.1",
+        "tetrahedra: 5 on 8 nodes, 1 part(s)",
+        "extent: 1 x 1 x 1 m, volume 1.000000e0 m³",
+        "quality: radius ratio 3r/R 0.732 in the median, 7.321e-1 at worst; 0 slivers",
+        "boundary: 8 vertices, 12 triangles, Euler number 2",
+        "passed over: 1 points, lines and faces",
+        "note: 1 inverted tetrahedra mended by swapping two corners: number 2",
+    ] {
+        assert!(text.contains(fact), "{fact}:\n{text}");
+    }
+}
+
+#[test]
 fn a_tetrahedral_mesh_reads_back_as_it_was_written() {
     let (_, block) = lattice::block_of_cells(Vec3::new(0.3, 0.1, 0.07), [4, 2, 3]);
     let imported = sound(export::msh_bytes(&block.tets));

@@ -15,7 +15,7 @@ use std::path::Path;
 
 /// Finest cells of a graded slab that says nothing of them, as a share of its height: about 15,000
 /// tetrahedra.
-const FINEST_SHARE: f32 = 0.009;
+const FINEST_SHARE: f32 = 0.006;
 
 /// A scene's body, ready to be simulated and drawn.
 pub struct LoadedBody {

@@ -9,18 +9,24 @@
 
 use super::{
     super::{Embedding, SurfaceMesh, TetMesh, tet::lumped_masses_kg},
-    Lattice, LatticeError, TETS_MAX,
+    Lattice, LatticeError,
     block::skin,
 };
 use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 
 /// Radius of the region of finest cells round the middle of the top face, as a share of the height.
-const CORE_SHARE: f64 = 0.02;
+const CORE_SHARE: f64 = 0.0175;
+/// So many times the finest cell is added for each radius of that region further out.
+const GROWTH: f64 = 1.5;
+/// More tetrahedra than this are refused: the ratio of the largest cell to the finest is limited
+/// by f32 before that.
+const GRADED_TETS_MAX: usize = 250_000;
 
 /// A box of `size_m` below the origin, which is the middle of its top face (y = max), of tissue of
 /// `density_kg_m3`, with its own skin as surface. No edge is longer than `cell_m` near the origin;
-/// further away than a fiftieth of the height, edges may be longer in proportion to the distance.
+/// further away than a fiftieth of the height, edges may grow with the distance. Half the cell makes
+/// all edges half as long.
 ///
 /// Numbers are the finer the nearer they are to 0, as the cells are: rounding to f32 is the same
 /// share of every cell.
@@ -42,9 +48,8 @@ pub fn graded_block(
     let core_m = CORE_SHARE * f64::from(size_m.y);
     let out_of_range = || LatticeError::CellOutOfRange {
         cell_m,
-        // The core takes about twelve tetrahedra a cell of its volume, every octave of distance
-        // some times more.
-        min_m: (core_m * (2000.0 / TETS_MAX as f64).cbrt()) as f32,
+        // Counted: 600 (core / cell)³ tetrahedra where the box is twice as wide as high.
+        min_m: (core_m * (1000.0 / GRADED_TETS_MAX as f64).cbrt()) as f32,
         max_m: size_m.y,
     };
     if !(cell_m > 0.0 && cell_m <= size_m.y) {
@@ -53,7 +58,8 @@ pub fn graded_block(
     let high = Vec3::new(0.5, 0.0, 0.5) * size_m;
     let low = high - size_m;
     let mut bisection = Bisection::of_box(low.as_dvec3(), high.as_dvec3());
-    let edge_max_m = |distance_m: f64| f64::from(cell_m) * (distance_m / core_m).max(1.0);
+    let edge_max_m =
+        |distance_m: f64| f64::from(cell_m) * (1.0 + GROWTH * (distance_m / core_m - 1.0).max(0.0));
     bisection.refine(edge_max_m).ok_or_else(out_of_range)?;
     bisection.close().ok_or_else(out_of_range)?;
     let tets = bisection.into_tets(low, high);
@@ -148,7 +154,7 @@ impl Bisection {
             } else {
                 self.simplices.push(simplex);
             }
-            if self.simplices.len() + waiting.len() > TETS_MAX {
+            if self.simplices.len() + waiting.len() > GRADED_TETS_MAX {
                 return None;
             }
         }
@@ -171,7 +177,7 @@ impl Bisection {
                     self.simplices.push(simplex);
                 }
             }
-            if self.simplices.len() > TETS_MAX {
+            if self.simplices.len() > GRADED_TETS_MAX {
                 return None;
             }
             if self.simplices.len() == before {
@@ -272,7 +278,7 @@ mod tests {
             let longest = edges()
                 .map(|[a, b]| places[a].distance(places[b]))
                 .fold(0.0, f32::max);
-            if places.iter().all(|x| x.length() < 0.0032) {
+            if places.iter().all(|x| x.length() < 0.0028) {
                 in_core = in_core.max(longest);
             }
             farthest = farthest.max(longest);
@@ -280,18 +286,20 @@ mod tests {
         assert!(in_core <= cell_m, "{in_core}");
         assert!(farthest > 20.0 * cell_m, "{farthest}");
         let count = lattice.tets.tets.len();
-        assert!((10_000..20_000).contains(&count), "{count} tetrahedra");
+        assert!((4_000..10_000).contains(&count), "{count} tetrahedra");
     }
 
     #[test]
     fn a_cell_that_gives_too_many_tetrahedra_is_refused() {
+        let mut smallest_m = 0.0;
         for cell_m in [1e-6, 0.0, -1.0, f32::NAN, 1.0] {
             let error = graded_block(SIZE, cell_m, 1000.0).expect_err("it is out of range");
             let LatticeError::CellOutOfRange { min_m, .. } = error else {
                 panic!("{error}")
             };
-            assert!(graded_block(SIZE, 1.01 * min_m, 1000.0).is_ok());
+            smallest_m = min_m;
         }
+        assert!(graded_block(SIZE, 1.01 * smallest_m, 1000.0).is_ok());
         assert!(graded_block(Vec3::ZERO, 0.01, 1000.0).is_err());
         assert!(graded_block(SIZE, 0.01, -1.0).is_err());
     }
