@@ -475,6 +475,7 @@ mod tests {
                 residual_rms: 2e-7 + 3e-6 * poke,
                 volume_drift: -0.012 * poke,
                 tool_force_n: 4.1 * poke,
+                tool_depth_m: None,
                 penetration_m: 8e-5 * poke,
                 speed_max_m_s: 0.01 * poke,
             }
