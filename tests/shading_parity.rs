@@ -566,6 +566,7 @@ fn march_difference(gpu: &Gpu, source: &str, rule: Rule, samples: u32) -> f32 {
     let section = section();
     let to_light = Vec3::new(0.3, 0.5, 0.8).normalize();
     let view = View {
+        up: Vec3::Y,
         eye: Vec3::Z,
         target: Vec3::ZERO,
         fov_y: 0.5,
@@ -798,6 +799,7 @@ fn ball(gpu: &Gpu, kind: &str, sets: &[&str], light: &str) -> Vec<Vec4> {
     let rest = RestBox { low, high };
     let passes = FramePasses::new(gpu, &scene, &rest, &mesh, &tissue, [64, 64]).unwrap();
     let view = View {
+        up: Vec3::Y,
         eye: Vec3::new(0.0, 0.0, 0.4),
         target: Vec3::ZERO,
         fov_y: 0.3,

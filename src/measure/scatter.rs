@@ -181,7 +181,8 @@ impl Frame {
     }
 
     fn fails(&self, point: &Point) -> bool {
-        point.y.is_none_or(|y| !(y <= self.y_range.1))
+        // NaN is no better than what lies beyond the chart.
+        !point.y.is_some_and(|y| y <= self.y_range.1)
     }
 
     /// The opening tag, the title, the grid and both axes.

@@ -287,10 +287,10 @@ impl Contacts {
                 margin_m,
             };
             let found = if inside {
-                Some(seen.from_inside())
+                Some(seen.found_inside())
             } else {
                 let known = near.touch.map(|touch| self.touches[touch as usize].normal);
-                seen.from_outside(near, known)
+                seen.found_outside(near, known)
             };
             let Some(found) = found else { continue };
             // Corners are held for themselves.
@@ -404,7 +404,7 @@ struct Found {
 
 impl Seen {
     /// A triangle that was outside the tool, or nearly so, when the substep started.
-    fn from_outside(&self, near: &mut Near, known: Option<Vec3>) -> Option<Found> {
+    fn found_outside(&self, near: &mut Near, known: Option<Vec3>) -> Option<Found> {
         let slow = self.way_m < PASSING_SHARE * (near.clear_m + self.radius_m);
         if slow && self.way_m < SLOW_RADII * self.radius_m {
             let found = nearest(self.axis, self.end);
@@ -449,7 +449,7 @@ impl Seen {
     }
 
     /// The triangle that is to be drawn over a tool inside the body.
-    fn from_inside(&self) -> Found {
+    fn found_inside(&self) -> Found {
         let tip = [self.axis[0]; 2];
         let signed = |corners: [Vec3; 3]| {
             let found = nearest(tip, corners);

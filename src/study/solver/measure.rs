@@ -254,7 +254,7 @@ fn verdict(settled: &Settled, swung: &Swung, tip_error: Option<f64>, body: &Held
         faults.push((State::Failed, format!("{frozen} particles not finite")));
     }
     let farthest = settled.farthest_m.max(swung.farthest_m);
-    if !(farthest < THROWN_SIZES * body.size_m) {
+    if farthest.is_nan() || farthest >= THROWN_SIZES * body.size_m {
         faults.push((State::Failed, "explodes".to_owned()));
     }
     if settled.inverted_tets > 0 {
