@@ -132,6 +132,9 @@ fn description(mesh: &SurfaceMesh, material: &GlbMaterial, lengths: [usize; 4]) 
 
 /// A GLB of the two chunks; every section of `binary` is a multiple of four bytes long.
 fn join(json: &Value, binary: &[u8]) -> Vec<u8> {
+    // Keys in one order, whether or not some dependency has serde_json keep that of insertion.
+    let mut json = json.clone();
+    json.sort_all_objects();
     let mut json = json.to_string().into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
     let word = |length: usize| {

@@ -240,16 +240,23 @@ impl Fem {
         }
     }
 
-    /// What rounding of the stresses leaves of a force at best [N], summed over all corners.
-    pub(super) fn rounding_n(&self) -> f64 {
+    /// (λ + μ) times the volume of the body [J]: the energy of a strain of order 1.
+    pub(super) fn modulus_times_volume_j(&self) -> f64 {
+        let volume: f64 = self.elements.iter().map(|element| element.volume_m3).sum();
+        (self.material.mu_pa + self.material.lambda_pa) * volume
+    }
+
+    /// What rounding of `positions` leaves of the forces at best [N], as the norm over all elements.
+    pub(super) fn rounding_n(&self, positions: &[DVec3]) -> f64 {
         let modulus = self.material.mu_pa + self.material.lambda_pa;
-        let areas: f64 = (self.elements.iter())
+        let squares: f64 = (self.elements.iter())
             .map(|element| {
-                let sum: f64 = element.gradients.iter().map(|g| g.length()).sum();
-                element.volume_m3 * sum
+                let steepness: f64 = element.gradients.iter().map(|g| g.length()).sum();
+                let far = positions[element.corners[0] as usize].length();
+                (modulus * element.volume_m3 * steepness * (1.0 + steepness * far)).powi(2)
             })
             .sum();
-        1e-16 * modulus * areas
+        f64::EPSILON * squares.sqrt()
     }
 }
 

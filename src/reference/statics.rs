@@ -91,7 +91,7 @@ impl Fem {
                 load_share: share,
                 inertia: None,
             };
-            let floor = self.rounding_n();
+            let floor = self.rounding_n(&positions);
             let load = self.load_n(&positions);
             let wanted = if step == steps {
                 TOLERANCE

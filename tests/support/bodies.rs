@@ -4,6 +4,7 @@
 
 use glam::{DVec3, Quat, Vec3};
 use palpate::geom::lattice::block_of_cells;
+use palpate::geom::tet::lumped_masses_kg;
 use palpate::reference::{Fem, FemSetup, Material};
 use palpate::sim::{BodySetup, Simulation, SolverParams};
 
@@ -12,31 +13,16 @@ pub const DENSITY_KG_M3: f32 = 1000.0;
 /// A box from the origin to `size_m` of `cells`, held where `fixed` says; no gravity, no damping.
 pub fn block(size_m: Vec3, cells: [usize; 3], fixed: impl Fn(Vec3) -> bool) -> BodySetup {
     let (surface, lattice) = block_of_cells(size_m, cells);
-    let mut setup = BodySetup {
+    BodySetup {
         fixed: lattice.tets.particles.iter().map(|&x| fixed(x)).collect(),
-        masses_kg: Vec::new(),
+        masses_kg: lumped_masses_kg(&lattice.tets, DENSITY_KG_M3),
         fill: lattice.fill,
         triangles: surface.point_triangles(),
         embedding: lattice.embedding,
         tets: lattice.tets,
         gravity_m_s2: Vec3::ZERO,
         damping_per_s: 0.0,
-    };
-    lump(&mut setup);
-    setup
-}
-
-/// Gives each corner a quarter of the mass of each of its tetrahedra.
-pub fn lump(setup: &mut BodySetup) {
-    let x = |i: u32| setup.tets.particles[i as usize].as_dvec3();
-    let mut masses = vec![0.0; setup.tets.particles.len()];
-    for &[a, b, c, d] in &setup.tets.tets {
-        let volume = (x(b) - x(a)).dot((x(c) - x(a)).cross(x(d) - x(a))) / 6.0;
-        for corner in [a, b, c, d] {
-            masses[corner as usize] += volume / 4.0 * f64::from(DENSITY_KG_M3);
-        }
     }
-    setup.masses_kg = masses.iter().map(|&mass| mass as f32).collect();
 }
 
 /// Moves every particle inside a box of `size_m` by up to `way_m` along each axis, so that no two cells
@@ -48,7 +34,7 @@ pub fn shake_inside(setup: &mut BodySetup, size_m: Vec3, way_m: f32) {
             *x += way_m * scatter(i);
         }
     }
-    lump(setup);
+    setup.masses_kg = lumped_masses_kg(&setup.tets, DENSITY_KG_M3);
 }
 
 /// A vector within the cube of ±1, different for each `i`.

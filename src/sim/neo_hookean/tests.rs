@@ -1,3 +1,5 @@
+//! The stress kernel against a solve of its equations, and what must hold for any of its inputs.
+
 use super::*;
 use crate::sim::{Method, constraint};
 use glam::{DVec3, Vec3, Vec3Swizzles};
@@ -41,6 +43,27 @@ fn sweep(model: &mut NeoHookean, places: &mut [Vec4], params: &SolverParams) {
     model.project(&Team::alone(), places);
 }
 
+/// Solves nine equations, given the columns of their matrix, by Gauss and Jordan with pivots.
+fn solved(mut columns: [[f64; 9]; 9], mut right: [f64; 9]) -> [f64; 9] {
+    for step in 0..9 {
+        let pivot = (step..9)
+            .max_by(|&a, &b| columns[step][a].abs().total_cmp(&columns[step][b].abs()))
+            .expect("there are rows left");
+        columns
+            .iter_mut()
+            .for_each(|column| column.swap(step, pivot));
+        right.swap(step, pivot);
+        for row in (0..9).filter(|&row| row != step) {
+            let factor = columns[step][row] / columns[step][step];
+            for column in &mut columns {
+                column[row] -= factor * column[step];
+            }
+            right[row] -= factor * right[step];
+        }
+    }
+    std::array::from_fn(|row| right[row] / columns[row][row])
+}
+
 /// One projection of one tetrahedron from nothing, by the formulas at the head of the module, in
 /// f64 and with a 9×9 solve instead of the closed form.
 fn projected(mesh: &TetMesh, tet: usize, places: &[Vec4], params: &SolverParams) -> [DVec3; 4] {
@@ -70,26 +93,21 @@ fn projected(mesh: &TetMesh, tet: usize, places: &[Vec4], params: &SolverParams)
     let h2v = f64::from(params.substep_s()).powi(2) * volume;
     let shear = f64::from(STIFFNESS_IN_MU * lame.mu_pa);
     let bulk = f64::from(lame.mu_pa + lame.lambda_pa);
+    let own = f64::from(OWN_RESPONSE);
     let inner = |a: DMat3, b: DMat3| -> f64 {
         let (a, b) = (a.to_cols_array(), b.to_cols_array());
         (0..9).map(|k| a[k] * b[k]).sum()
     };
-    let system = nalgebra::SMatrix::<f64, 9, 9>::from_fn(|row, column| {
+    let system = |column: usize| -> [f64; 9] {
         let mut unit = [0.0; 9];
         unit[column] = 1.0;
         let moved = DMat3::from_cols_array(&unit) * mobility;
         let stress = moved * shear + cofactor * (bulk * inner(cofactor, moved));
-        f64::from(u8::from(row == column))
-            + f64::from(OWN_RESPONSE) * h2v * stress.to_cols_array()[row]
-    });
-    let misfit = nalgebra::SVector::<f64, 9>::from_row_slice(
-        &constraint::stress_pa(f, lame).to_cols_array(),
-    );
-    let change = system
-        .lu()
-        .solve(&misfit)
-        .expect("1 plus a positive matrix");
-    let change = DMat3::from_cols_slice(change.as_slice());
+        let stress = stress.to_cols_array();
+        std::array::from_fn(|row| f64::from(u8::from(row == column)) + own * h2v * stress[row])
+    };
+    let misfit = constraint::stress_pa(f, lame).to_cols_array();
+    let change = DMat3::from_cols_array(&solved(std::array::from_fn(system), misfit));
     std::array::from_fn(|k| x[k] - change * gradients[k] * (h2v * w[k]))
 }
 
