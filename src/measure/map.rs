@@ -4,10 +4,14 @@
 use super::chart::{AXIS_COLOR, TEXT_COLOR, escape};
 use std::fmt::Write;
 
-/// Side of a tile, and what lies round the tiles of a panel [px].
+/// Height of a tile and its least width, and what lies round the tiles of a panel [px].
 const TILE_PX: f64 = 24.0;
-const LEFT_PX: f64 = 58.0;
-const RIGHT_PX: f64 = 10.0;
+const RIGHT_PX: f64 = 14.0;
+/// Room left of the tiles, the names of the rows apart.
+const LABEL_PX: f64 = 24.0;
+/// Width of a letter of names and titles: there are no font metrics here.
+const NAME_LETTER_PX: f64 = 5.6;
+const TITLE_LETTER_PX: f64 = 7.2;
 const PANEL_TOP_PX: f64 = 20.0;
 const PANEL_BOTTOM_PX: f64 = 34.0;
 /// Title and legend above all panels.
@@ -57,14 +61,14 @@ impl Tile {
     }
 
     /// The tile with its upper left corner at a place.
-    fn svg(self, (x, y): (f64, f64)) -> String {
-        let side = TILE_PX - 1.5;
+    fn svg(self, (x, y): (f64, f64), width: f64) -> String {
+        let (width, height) = (width - 1.5, TILE_PX - 1.5);
         format!(
-            "<g class=\"{}\"><rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{side}\" height=\"{side}\" \
+            "<g class=\"{}\"><rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" \
              fill=\"{}\"/>{}</g>",
             self.name(),
             self.fill(),
-            self.glyph((x + side / 2.0, y + side / 2.0))
+            self.glyph((x + width / 2.0, y + height / 2.0))
         )
     }
 }
@@ -98,14 +102,32 @@ impl MapChart {
         let (width, height) = self.panel_px();
         let across = self.panels_across.max(1);
         let down = self.panels.len().div_ceil(across).max(1);
-        (across as f64 * width, HEAD_PX + down as f64 * height)
+        let title = 8.0 * self.title.chars().count() as f64;
+        (
+            (across as f64 * width).max(title),
+            HEAD_PX + down as f64 * height,
+        )
     }
 
     fn panel_px(&self) -> (f64, f64) {
+        let tiles = self.tile_px() * self.columns.len() as f64;
+        let titles = self.panels.iter().map(|panel| panel.title.as_str());
+        let title = LABEL_PX + TITLE_LETTER_PX * longest(titles);
         (
-            LEFT_PX + RIGHT_PX + TILE_PX * self.columns.len() as f64,
+            (self.left_px() + tiles + RIGHT_PX).max(title),
             PANEL_TOP_PX + PANEL_BOTTOM_PX + TILE_PX * self.rows.len() as f64,
         )
+    }
+
+    /// Room left of the tiles.
+    fn left_px(&self) -> f64 {
+        LABEL_PX + NAME_LETTER_PX * longest(self.rows.iter().map(String::as_str))
+    }
+
+    /// Width of a tile, with room for its name.
+    fn tile_px(&self) -> f64 {
+        let names = longest(self.columns.iter().map(String::as_str));
+        (4.0 + NAME_LETTER_PX * names).max(TILE_PX)
     }
 
     /// The chart as an `<svg>` element.
@@ -124,7 +146,7 @@ impl MapChart {
                 svg,
                 "<g class=\"legend\" transform=\"translate({x} 20) scale(0.75)\">{}</g>\
                  <text x=\"{}\" y=\"33\">{}</text>",
-                tile.svg((0.0, 0.0)),
+                tile.svg((0.0, 0.0), TILE_PX),
                 x + 22.0,
                 tile.name()
             )
@@ -134,7 +156,7 @@ impl MapChart {
         let (panel_width, panel_height) = self.panel_px();
         for (index, panel) in self.panels.iter().enumerate() {
             let across = self.panels_across.max(1);
-            let left = (index % across) as f64 * panel_width + LEFT_PX;
+            let left = (index % across) as f64 * panel_width + self.left_px();
             let top = HEAD_PX + (index / across) as f64 * panel_height + PANEL_TOP_PX;
             svg += &self.panel(panel, (left, top));
         }
@@ -143,9 +165,12 @@ impl MapChart {
 
     fn panel(&self, panel: &Panel, (left, top): (f64, f64)) -> String {
         let (columns, rows) = (self.columns.len(), self.rows.len());
+        let width = self.tile_px();
+        let edge = left - self.left_px();
         let bottom = top + TILE_PX * rows as f64;
         let mut svg = format!(
-            "<text x=\"{left}\" y=\"{:.1}\" font-weight=\"600\">{}</text>",
+            "<text x=\"{:.1}\" y=\"{:.1}\" font-weight=\"600\">{}</text>",
+            edge + LABEL_PX - 8.0,
             top - 6.0,
             escape(&panel.title)
         );
@@ -153,7 +178,7 @@ impl MapChart {
             write!(
                 svg,
                 "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" font-size=\"9\">{}</text>",
-                left + TILE_PX * (column as f64 + 0.5),
+                left + width * (column as f64 + 0.5),
                 bottom + 11.0,
                 escape(name)
             )
@@ -175,15 +200,15 @@ impl MapChart {
              <text transform=\"translate({:.1} {:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>\
              <rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"none\" \
              stroke=\"{AXIS_COLOR}\" stroke-width=\"0.6\"/>",
-            left + TILE_PX * columns as f64 / 2.0,
+            left + width * columns as f64 / 2.0,
             bottom + 24.0,
             escape(&self.x_label),
-            left - LEFT_PX + 12.0,
+            edge + 12.0,
             (top + bottom) / 2.0,
             escape(&self.y_label),
             left - 1.5,
             top - 1.5,
-            TILE_PX * columns as f64 + 1.5,
+            width * columns as f64 + 1.5,
             TILE_PX * rows as f64 + 1.5,
         )
         .expect(TEXT_EXPECT);
@@ -192,15 +217,21 @@ impl MapChart {
                 let here = |point: &&(usize, usize, Tile)| (point.0, point.1) == (column, row);
                 let worst = panel.points.iter().filter(here).map(|point| point.2).max();
                 if let Some(tile) = worst {
-                    svg += &tile.svg((
-                        left + TILE_PX * column as f64,
+                    let place = (
+                        left + width * column as f64,
                         bottom - TILE_PX * (row as f64 + 1.0),
-                    ));
+                    );
+                    svg += &tile.svg(place, width);
                 }
             }
         }
         svg
     }
+}
+
+/// Letters of the longest name.
+fn longest<'a>(names: impl Iterator<Item = &'a str>) -> f64 {
+    names.map(|name| name.chars().count()).max().unwrap_or(0) as f64
 }
 
 #[cfg(test)]
@@ -256,11 +287,14 @@ mod tests {
         map.panels = vec![map.panels[0].clone(); 5];
         map.panels_across = 2;
         let (width, height) = map.size_px();
-        assert_eq!(width, 2.0 * (LEFT_PX + RIGHT_PX + 2.0 * TILE_PX));
+        assert_eq!(width, 2.0 * map.panel_px().0);
         assert_eq!(
             height,
             HEAD_PX + 3.0 * (PANEL_TOP_PX + PANEL_BOTTOM_PX + 3.0 * TILE_PX)
         );
         assert!(map.svg().contains("xpbd &lt;springs&gt;"));
+        // A long name makes room for itself.
+        map.columns[1] = "millimetre".to_owned();
+        assert!(map.size_px().0 > width);
     }
 }

@@ -10,15 +10,15 @@ const BOTTOM_PX: f64 = 38.0;
 /// Room above the plot: the title, then a legend of so many rows.
 const TITLE_PX: f64 = 22.0;
 const LEGEND_ROW_PX: f64 = 16.0;
-/// Band of the failed points, between legend and plot.
-const FAILED_PX: f64 = 16.0;
+/// Band of the failed points and their labels, between legend and plot.
+const FAILED_PX: f64 = 30.0;
 /// Half the width of a marker.
 const MARKER_PX: f64 = 3.6;
 /// Points of other programs and notes.
 const HOLLOW_COLOR: &str = "#3c4048";
 const LABEL_PX: f64 = 9.5;
 /// Width of a letter as a share of the height of its font; there are no font metrics here.
-const LETTER: f64 = 0.56;
+const LETTER: f64 = 0.62;
 const TEXT_EXPECT: &str = "a string takes all that is written to it";
 
 /// Points of one kind.
@@ -168,7 +168,7 @@ impl Frame {
 
     /// Height of the failed points.
     fn failed_y(&self) -> f64 {
-        self.top - FAILED_PX / 2.0
+        self.top - FAILED_PX / 3.0
     }
 
     /// Where a point is drawn; nowhere without an x.
@@ -301,6 +301,7 @@ impl Frame {
                 x > self.left
                     && x + width < self.right + RIGHT_PX
                     && y < self.bottom
+                    && y - LABEL_PX > self.top - FAILED_PX
                     && taken.is_free([x, y - LABEL_PX + 1.5, x + width, y + 1.5])
             };
             let Some((x, y)) = places.into_iter().find(fits) else {

@@ -11,19 +11,35 @@ const THROWN_SIZES: f64 = 3.0;
 /// More substeps than this are not tried.
 const SUBSTEPS_MAX: u32 = 8192;
 
-/// The fewest substeps a step that keep the body together; `None` if a single one does.
-pub fn fewest_substeps(body: &HeldBody, params: SolverParams) -> Option<u32> {
-    let is_stable = |substeps| {
-        holds(
-            body,
-            SolverParams {
-                substeps,
-                iterations: 1,
-                ..params
-            },
-        )
-    };
-    fewest(is_stable)
+/// How long a substep may be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limit {
+    /// The longest that keeps the body together [s]; `None` if one substep a step does.
+    pub found_s: Option<f64>,
+    /// What the method itself says, of the body at rest [s].
+    pub estimate_s: Option<f64>,
+}
+
+impl Limit {
+    /// Finds the limit of a body with a method and material, in steps of `timestep_s`.
+    pub fn of(body: &HeldBody, params: SolverParams, timestep_s: f64) -> Self {
+        let is_stable = |substeps| {
+            let iterations = 1;
+            holds(
+                body,
+                SolverParams {
+                    substeps,
+                    iterations,
+                    ..params
+                },
+            )
+        };
+        let at_rest = Simulation::new(body.setup.clone(), params);
+        Self {
+            found_s: fewest(is_stable).map(|substeps| timestep_s / f64::from(substeps)),
+            estimate_s: at_rest.stable_substep_s().map(f64::from),
+        }
+    }
 }
 
 /// The fewest substeps that are stable, by bisection; `None` if one is.
@@ -79,10 +95,11 @@ mod tests {
             youngs_modulus_pa: 1e5,
             ..SolverParams::default()
         };
-        let fewest = fewest_substeps(&beam, params).expect("one substep a frame is too long");
-        let found = f64::from(params.timestep_s) / f64::from(fewest);
-        let estimate = Simulation::new(beam.setup.clone(), params).stable_substep_s();
-        let estimate = f64::from(estimate.expect("springs have an estimate"));
+        let limit = |params: SolverParams| Limit::of(&beam, params, 1.0 / 60.0);
+        let found = limit(params)
+            .found_s
+            .expect("one substep a frame is too long");
+        let estimate = limit(params).estimate_s.expect("springs have an estimate");
         // The estimate is a bound on the stiffest mode from below the limit; a motion of half a
         // length stiffens and softens springs, and may take longer than 30 frames to blow up.
         assert!(
@@ -93,6 +110,6 @@ mod tests {
             method: Method::XpbdNeoHookean,
             ..params
         };
-        assert_eq!(fewest_substeps(&beam, constraints), None);
+        assert_eq!(limit(constraints).found_s, None);
     }
 }

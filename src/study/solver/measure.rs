@@ -5,6 +5,7 @@ use super::super::oracle::Oracle;
 use super::super::sweep::{Cost, Row, State, Verdict, finite};
 use super::super::timing::{Clock, Times};
 use super::Cell;
+use super::limit::Limit;
 use crate::measure::chart::number;
 use crate::sim::diagnose::volume_and_inverted;
 use crate::sim::{Simulation, SolverParams};
@@ -68,12 +69,12 @@ pub struct Measures {
     pub ms_p50_two_threads: Option<f64>,
 }
 
-/// Measures one cell. `limit` is its longest stable substep [s].
+/// Measures one cell.
 pub fn row(
     cell: &Cell,
     body: &HeldBody,
     oracle: &Oracle,
-    limit: Option<f64>,
+    limit: Limit,
     threads: usize,
 ) -> Row<Cell, Measures> {
     let mut simulation = Simulation::new(body.setup.clone(), cell.params());
@@ -94,7 +95,8 @@ pub fn row(
     let ours = Swings::of(&swung.tip_m);
     let theirs = Swings::of(&oracle.swing_m);
     let swing_error = relative(ours.first_m(), theirs.first_m());
-    let tip_error = relative(finite(settled.tip_m), Some(oracle_tip_m));
+    let has_burst = settled.has_burst(body) || swung.has_burst(body);
+    let tip_error = relative(finite(settled.tip_m), Some(oracle_tip_m)).filter(|_| !has_burst);
     let measures = Measures {
         tets: body.setup.tets.tets.len(),
         oracle: if theirs.lowest.is_empty() {
@@ -105,7 +107,8 @@ pub fn row(
         tip_m: finite(settled.tip_m),
         tip_oracle_m: oracle_tip_m,
         tip_error_rel: tip_error,
-        field_rms_error_rel: finite(field_error(&settled.positions, &oracle.settled_m, body)),
+        field_rms_error_rel: finite(field_error(&settled.positions, &oracle.settled_m, body))
+            .filter(|_| !has_burst),
         swing_m: ours.first_m(),
         swing_oracle_m: theirs.first_m(),
         swing_error_rel: swing_error,
@@ -116,8 +119,8 @@ pub fn row(
         inverted_tets: settled.inverted_tets,
         speed_left_m_s: finite(settled.speed_m_s),
         volume_error_rel: finite(volume_error(&settled.positions, &oracle.settled_m, body)),
-        stable_substep_s: limit,
-        stable_substep_estimate_s: simulation.stable_substep_s().map(f64::from),
+        stable_substep_s: limit.found_s,
+        stable_substep_estimate_s: limit.estimate_s,
         cpu_ms_p50: swung.times.cpu().map(|(median, _)| median),
         ms_p50_two_threads: two_threads.flatten().map(|(median, _)| median),
     };
@@ -141,6 +144,13 @@ struct Settled {
     inverted_tets: usize,
     frozen: usize,
     farthest_m: f64,
+}
+
+impl Settled {
+    /// Whether parts of it were thrown away.
+    fn has_burst(&self, body: &HeldBody) -> bool {
+        self.frozen > 0 || self.farthest_m >= THROWN_SIZES * body.size_m
+    }
 }
 
 fn settle(body: &HeldBody, params: SolverParams) -> Settled {
@@ -170,6 +180,13 @@ struct Swung {
     times: Times,
     frozen: usize,
     farthest_m: f64,
+}
+
+impl Swung {
+    /// Whether parts of it were thrown away.
+    fn has_burst(&self, body: &HeldBody) -> bool {
+        self.frozen > 0 || self.farthest_m >= THROWN_SIZES * body.size_m
+    }
 }
 
 fn swing(simulation: &mut Simulation, body: &HeldBody, frames: usize) -> Swung {
@@ -253,8 +270,8 @@ fn verdict(settled: &Settled, swung: &Swung, tip_error: Option<f64>, body: &Held
     if frozen > 0 {
         faults.push((State::Failed, format!("{frozen} particles not finite")));
     }
-    let farthest = settled.farthest_m.max(swung.farthest_m);
-    if farthest.is_nan() || farthest >= THROWN_SIZES * body.size_m {
+    let has_burst = settled.has_burst(body) || swung.has_burst(body);
+    if has_burst {
         faults.push((State::Failed, "explodes".to_owned()));
     }
     if settled.inverted_tets > 0 {
@@ -262,6 +279,8 @@ fn verdict(settled: &Settled, swung: &Swung, tip_error: Option<f64>, body: &Held
         faults.push((State::Failed, why));
     }
     match tip_error {
+        // How far pieces lie apart says nothing.
+        _ if has_burst => {}
         None => faults.push((State::Failed, "no settled tip".to_owned())),
         Some(error) => {
             let why = || format!("settles {} % off", number(100.0 * error));

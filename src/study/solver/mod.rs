@@ -10,6 +10,8 @@ mod show;
 
 pub use measure::Measures;
 
+use limit::Limit;
+
 use super::Study;
 use super::findings::Findings;
 use super::held_body::{HeldBody, Hold, beam};
@@ -156,7 +158,7 @@ pub struct Solver {
     file: Option<PathBuf>,
     bodies: Shared<String, HeldBody>,
     oracles: Shared<String, Oracle>,
-    limits: Shared<String, Option<f64>>,
+    limits: Shared<String, Limit>,
 }
 
 /// What is made once and used by many cells.
@@ -257,10 +259,7 @@ impl Sweep for Solver {
         let limit = shared(
             &self.limits,
             format!("{tissue}-{}", cell.method.name()),
-            || {
-                let fewest = limit::fewest_substeps(&body, cell.params());
-                Ok(fewest.map(|substeps| cell.timestep_s / f64::from(substeps)))
-            },
+            || Ok(Limit::of(&body, cell.params(), cell.timestep_s)),
         )?;
         Ok(measure::row(cell, &body, &oracle, *limit, self.threads))
     }

@@ -2,7 +2,7 @@
 
 use super::super::findings::Findings;
 use super::super::peers::{Peer, peers};
-use super::super::sweep::{Row, State};
+use super::super::sweep::Row;
 use super::{Cell, Measures};
 use crate::measure::chart::{number, three_digits};
 use crate::measure::page::{Block, Table};
@@ -14,8 +14,9 @@ type SolverRow = Row<Cell, Measures>;
 /// Size of one chart [px].
 const CHART_PX: (f64, f64) = (520.0, 400.0);
 const COLUMNS: usize = 2;
-/// What the charts show of the errors [%].
-const ERROR_RANGE: (f64, f64) = (1e-3, 200.0);
+/// What the charts show of the settled and of the swing error [%].
+const SETTLED_RANGE: (f64, f64) = (1e-5, 200.0);
+const SWING_RANGE: (f64, f64) = (0.05, 200.0);
 /// Errors that a user may ask for, of which the cheapest setting is told.
 const BOUNDS: [f64; 4] = [0.02, 0.005, 0.001, 0.0001];
 /// Speed that is rest [m/s].
@@ -158,7 +159,13 @@ fn lead(bodies: &[Body]) -> String {
 fn settled_chart(body: &Body, peers: &[Peer]) -> (String, String) {
     let error = |row: &SolverRow| settled_error(row);
     let peer_error = |peer: &Peer| peer.tip_error_rel.filter(|_| peer.inverted_tets == Some(0));
-    let chart = chart(body, peers, "settled tip error [%]", &error, &peer_error);
+    let chart = chart(
+        body,
+        peers,
+        ("settled tip error [%]", SETTLED_RANGE),
+        &error,
+        &peer_error,
+    );
     let caption = format!(
         "Settled tip of {}: error against processor time of a frame of 1/60 s on one core. Labels are \
          substeps × iterations; lines join settings of one iteration. Hollow: other programs. Errors \
@@ -176,7 +183,13 @@ fn swing_chart(body: &Body, peers: &[Peer]) -> (String, String) {
     let swung: Vec<Peer> = (peers.iter().filter(|peer| peer.swing_error_rel.is_some()))
         .cloned()
         .collect();
-    let chart = chart(body, &swung, "first swing error [%]", &error, &peer_error);
+    let chart = chart(
+        body,
+        &swung,
+        ("first swing error [%]", SWING_RANGE),
+        &error,
+        &peer_error,
+    );
     let caption = format!(
         "Depth of the first undamped swing of {}: error against processor time of a frame on one core.",
         body.name()
@@ -184,8 +197,9 @@ fn swing_chart(body: &Body, peers: &[Peer]) -> (String, String) {
     (chart.svg(), caption)
 }
 
+/// Whether nothing is left of the body that an error could be told of.
 fn has_burst(row: &SolverRow) -> bool {
-    row.verdict.state == State::Failed && row.measures.tip_error_rel.is_none()
+    row.measures.tip_error_rel.is_none()
 }
 
 /// The error of a body that came to rest as a body.
@@ -197,7 +211,7 @@ fn settled_error(row: &SolverRow) -> Option<f64> {
 fn chart(
     body: &Body,
     peers: &[Peer],
-    y_label: &str,
+    (y_label, y_range): (&str, (f64, f64)),
     error: &dyn Fn(&SolverRow) -> Option<f64>,
     peer_error: &dyn Fn(&Peer) -> Option<f64>,
 ) -> ScatterChart {
@@ -260,7 +274,7 @@ fn chart(
         x_label: "processor time of a frame, one core [ms]".to_owned(),
         y_label: y_label.to_owned(),
         x_range: around(times),
-        y_range: ERROR_RANGE,
+        y_range,
         clouds,
     }
 }

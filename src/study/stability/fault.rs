@@ -64,7 +64,7 @@ struct Bounds(f64, f64);
 
 /// Farther from rest than this many sizes, a particle was thrown.
 const THROWN_SIZES: f64 = 20.0;
-/// Speed left after 2.5 s of damping [m/s]: a jitter that is seen from a tenth of a metre a second.
+/// Speed left after the damping [m/s]: a jitter that is seen from a tenth of a metre a second.
 const SPEED_M_S: Bounds = Bounds(1e-3, 0.1);
 /// Sag over the static one, and its inverse: an organ twice as soft is another organ.
 const SAG: Bounds = Bounds(1.1, 2.0);

@@ -182,15 +182,7 @@ fn map_of_moduli_and_substeps(rows: &[StabilityRow]) -> Option<MapChart> {
         })
     });
     let panels: Vec<Panel> = panels.collect();
-    let milliseconds = |s: &f64| {
-        // Two digits: the tiles are narrow.
-        let ms = 1e3 * s;
-        if ms < 9.5 {
-            format!("{ms:.1}")
-        } else {
-            format!("{ms:.0}")
-        }
-    };
+    let milliseconds = |s: &f64| number((1e5 * s).round() / 1e2);
     (!hanging.is_empty()).then(|| MapChart {
         title: "Hanging and standing bodies: modulus against substep".to_owned(),
         x_label: "substep [ms]".to_owned(),
@@ -244,12 +236,10 @@ fn map_of_starts(rows: &[StabilityRow]) -> Option<MapChart> {
         )
     };
     let methods = methods(rows);
-    // Four letters are as wide as a tile.
-    let short = |mesh: &Mesh| mesh.name().chars().take(4).collect();
     (!wrecked.is_empty()).then(|| MapChart {
         title: "Wrecked bodies: start against mesh".to_owned(),
         x_label: "mesh".to_owned(),
-        columns: meshes.iter().map(short).collect(),
+        columns: meshes.iter().map(|mesh| mesh.name().to_owned()).collect(),
         y_label: "start".to_owned(),
         rows: starts.iter().map(|start| start.name().to_owned()).collect(),
         panels_across: methods.len(),
@@ -465,7 +455,7 @@ fn failed_of_default(rows: &[StabilityRow]) -> Table {
             three_digits(1e3 * cell.timestep_s),
             cell.substeps.to_string(),
             poke,
-            format!("{}", cell.start.name()),
+            cell.start.name().to_owned(),
             row.verdict.why.clone(),
         ]
     };

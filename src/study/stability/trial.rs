@@ -12,22 +12,24 @@ use crate::sim::{Simulation, ToolAction, ToolInput, ToolShape};
 use glam::{DMat3, DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// Frames without any force, in which nothing may move.
-const REST_FRAMES: u32 = 60;
-/// Frames of undamped release, in which no energy may be gained.
-const RELEASE_FRAMES: u32 = 60;
-/// Frames of damping, after which a body hangs still.
-const SETTLE_FRAMES: u32 = 150;
-/// Frames in which a wrecked body must be back.
-const RECOVER_FRAMES: u32 = 180;
-/// Damping of a body that is to settle [1/s].
-const DAMPING_PER_S: f32 = 10.0;
+/// Time without any force, in which nothing may move [s].
+const REST_S: f64 = 1.0;
+/// Time of undamped release, in which no energy may be gained [s].
+const RELEASE_S: f64 = 1.0;
+/// Time of damping, after which a body of 10 kPa hangs still [s]; a softer one takes longer.
+const SETTLE_S: f64 = 2.5;
+/// Time in which a wrecked body must be back [s]; again of 10 kPa.
+const RECOVER_S: f64 = 3.0;
+/// Damping of a body of 10 kPa or more that is to settle [1/s]. More would hold a softer one back.
+const DAMPING_PER_S: f64 = 10.0;
+/// Modulus for which these times are [Pa].
+const MODULUS_PA: f64 = 1e4;
 /// Radius of the tool, and how deep its front is pushed in, as shares of the thickness.
 const TOOL_RADIUS_SHARE: f32 = 0.2;
 const TOOL_DEPTH_SHARE: f32 = 0.3;
-/// Frames the tool stays there, and frames after it has left.
-const HOLD_FRAMES: u32 = 20;
-const AFTER_FRAMES: u32 = 60;
+/// Time the tool stays there, and time after it has left [s].
+const HOLD_S: f64 = 0.33;
+const AFTER_S: f64 = 1.0;
 /// Friction of the tool.
 const FRICTION: f32 = 0.3;
 
@@ -69,6 +71,21 @@ pub struct Measures {
     pub tunnelled: Option<bool>,
     /// Largest force on the tool [N].
     pub force_max_n: Option<f64>,
+}
+
+impl Cell {
+    /// How much slower than a body of 10 kPa this one moves; 1 for stiffer ones.
+    fn slowness(&self) -> f64 {
+        (MODULUS_PA / self.youngs_modulus_pa).sqrt().max(1.0)
+    }
+
+    fn frames(&self, time_s: f64) -> u32 {
+        (time_s / self.timestep_s).round() as u32
+    }
+
+    fn damping_per_s(&self) -> f32 {
+        (DAMPING_PER_S / self.slowness()) as f32
+    }
 }
 
 /// A body under way, watched.
@@ -154,16 +171,16 @@ impl<'a> Watched<'a> {
 /// Rest, undamped release, damped settling. `equilibrium` is the static solution [m].
 pub fn hang(cell: &Cell, body: &HeldBody, equilibrium: Option<&[DVec3]>) -> Row<Cell, Measures> {
     let mut resting = Watched::new(cell, body, Vec3::ZERO, 0.0);
-    resting.steps(REST_FRAMES);
+    resting.steps(cell.frames(REST_S));
     let mut hanging = Watched::new(cell, body, GRAVITY_M_S2, 0.0);
     let start_j = energy(&hanging.simulation).total_j();
     let mut highest_j = start_j;
-    for _ in 0..RELEASE_FRAMES {
+    for _ in 0..cell.frames(RELEASE_S) {
         hanging.step(&[]);
         highest_j = highest_j.max(energy(&hanging.simulation).total_j());
     }
-    (hanging.simulation).set_gravity_and_damping(GRAVITY_M_S2, DAMPING_PER_S);
-    hanging.steps(SETTLE_FRAMES);
+    (hanging.simulation).set_gravity_and_damping(GRAVITY_M_S2, cell.damping_per_s());
+    hanging.steps(cell.frames(SETTLE_S * cell.slowness()));
     let positions = hanging.simulation.particles();
     let mut measures = hanging.measures(cell, "Newton statics");
     measures.not_finite_frame = resting.not_finite_frame.or(measures.not_finite_frame);
@@ -201,8 +218,8 @@ fn volume_error(body: &HeldBody, positions: &[Vec3], truth: &[Vec3]) -> Option<f
 
 /// Settled, wrecked, let go.
 pub fn wreck(cell: &Cell, body: &HeldBody) -> Row<Cell, Measures> {
-    let mut watched = Watched::new(cell, body, GRAVITY_M_S2, DAMPING_PER_S);
-    watched.steps(SETTLE_FRAMES);
+    let mut watched = Watched::new(cell, body, GRAVITY_M_S2, cell.damping_per_s());
+    watched.steps(cell.frames(SETTLE_S * cell.slowness()));
     let settled = watched.simulation.particles().to_vec();
     let tets = &body.setup.tets.tets;
     let inverted = volume_and_inverted(&settled, tets).1;
@@ -213,7 +230,7 @@ pub fn wreck(cell: &Cell, body: &HeldBody) -> Row<Cell, Measures> {
         let wrecked = wrecked(cell, body, &settled);
         let still = vec![Vec3::ZERO; wrecked.len()];
         watched.simulation.set_state(&wrecked, &still);
-        for frame in 1..=RECOVER_FRAMES {
+        for frame in 1..=cell.frames(RECOVER_S * cell.slowness()) {
             watched.step(&[]);
             let positions = watched.simulation.particles();
             rms = rms_distance_m(positions, &settled) / body.size_m;
@@ -283,7 +300,7 @@ pub fn poke(cell: &Cell, body: &HeldBody) -> Row<Cell, Measures> {
         action: ToolAction::Push,
         friction: FRICTION,
     };
-    let mut watched = Watched::new(cell, body, Vec3::ZERO, DAMPING_PER_S);
+    let mut watched = Watched::new(cell, body, Vec3::ZERO, cell.damping_per_s());
     let (mut penetration_m, mut force_n) = (0.0_f32, 0.0_f32);
     let mut go = |watched: &mut Watched, z: f32| {
         watched.step(&[tool(z)]);
@@ -300,7 +317,7 @@ pub fn poke(cell: &Cell, body: &HeldBody) -> Row<Cell, Measures> {
     for step in 1..=down {
         go(&mut watched, (above.z - way_m * step as f32).max(deepest));
     }
-    for _ in 0..HOLD_FRAMES {
+    for _ in 0..cell.frames(HOLD_S) {
         go(&mut watched, deepest);
     }
     let middle = above.with_z(deepest).as_dvec3();
@@ -312,7 +329,7 @@ pub fn poke(cell: &Cell, body: &HeldBody) -> Row<Cell, Measures> {
     for step in 1..=down {
         go(&mut watched, (deepest + way_m * step as f32).min(above.z));
     }
-    watched.steps(AFTER_FRAMES);
+    watched.steps(cell.frames(AFTER_S * cell.slowness()));
     let mut measures = watched.measures(cell, "invariants");
     measures.penetration_share = finite(f64::from(penetration_m / thickness_m));
     measures.tunnelled = Some(tunnelled);
