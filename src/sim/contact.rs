@@ -17,7 +17,7 @@ mod nearest;
 mod sweep;
 mod touch;
 
-pub use inside::is_inside;
+pub use inside::{is_inside, way_out};
 pub use near::{Surface, SweptBox};
 
 use super::{ToolShape, handle::Handle};
@@ -27,11 +27,15 @@ use nearest::{Axis, Nearest, blend, nearest};
 use sweep::sweep;
 use touch::Touch;
 
-/// A place found inside the tool leaves it no faster than this [m/s]: a tool that appears inside
-/// the body must not fling it away.
-const DEPENETRATION_SPEED_M_S: f32 = 0.5;
+/// A place found inside a tool leaves it no faster than this [m/s], and a tool found inside the body
+/// comes in from outside no faster: it must not fling the body away.
+pub const DEPENETRATION_SPEED_M_S: f32 = 0.5;
 /// Sweeps over the touches between two looks at the surface, if they do not settle before.
-const SWEEPS_MAX: usize = 12;
+const SWEEPS_MAX: usize = 100;
+/// A tool goes this many of its radii in one piece.
+const PIECE_RADII: f32 = 0.5;
+/// Pieces of a substep at most; longer ones are swept.
+const PIECES_MAX: u32 = 500;
 /// Touches have settled when none moves its place by more than this share of the largest move.
 const SETTLED_SHARE: f32 = 0.001;
 /// Looks at the surface in one solve, if it does not settle before.
@@ -59,18 +63,6 @@ pub struct Motion {
     pub to_m: Vec3,
 }
 
-/// On which side of the surface the tip of a tool is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Side {
-    /// Not looked at yet.
-    #[default]
-    Unknown,
-    /// Outside: it is kept there.
-    Outside,
-    /// Inside, where it appeared or was forced to: the surface next to it is drawn over it.
-    Inside,
-}
-
 /// A contact as it is seen by a solver that solves for all positions at once.
 #[derive(Clone, Copy, Debug)]
 #[allow(dead_code, reason = "for solvers that find all multipliers at once")]
@@ -91,9 +83,10 @@ pub struct ActiveContact {
 /// What one tool touches.
 #[derive(Clone, Debug, Default)]
 pub struct Contacts {
-    side: Side,
     vicinity: Vicinity,
     touches: Vec<Touch>,
+    /// What earlier pieces of this substep have pushed [kg m].
+    pushed: Vec3,
     /// Whether it pressed on the body when the last step began.
     pressed_before: bool,
     /// Touches are swept to and fro, so that none is always the last.
@@ -104,11 +97,6 @@ impl Contacts {
     /// Forgets everything: the tool was lifted.
     pub fn clear(&mut self) {
         *self = Self::default();
-    }
-
-    /// Forgets on which side of the surface the tool is: the body was put elsewhere.
-    pub fn forget_side(&mut self) {
-        self.side = Side::Unknown;
     }
 
     /// Whether the tool pressed on the body in the last substep.
@@ -127,37 +115,27 @@ impl Contacts {
         self.touches.len()
     }
 
-    /// Finds the triangles that the tool may touch in a step in which it goes from `from_m` on and
-    /// sweeps `swept`. A tool that was known to be outside stays outside.
+    /// Whether the tool has let go of the body since the step before: it may have slipped in.
+    pub fn lets_go(&mut self) -> bool {
+        let pressed = self.pressed();
+        std::mem::replace(&mut self.pressed_before, pressed) && !pressed
+    }
+
+    /// Finds the features that the tool may touch in a step in which it goes from `from_m` on and
+    /// sweeps `swept`.
     pub fn begin_step(
         &mut self,
         shape: ToolShape,
         from_m: Vec3,
         swept: SweptBox,
         surface: Surface,
-        places: &[Vec4],
     ) {
-        let pressed = self.pressed();
-        let released = std::mem::replace(&mut self.pressed_before, pressed) && !pressed;
         if swept.misses(surface.bounds) {
             self.vicinity.clear();
             self.touches.clear();
-            self.side = Side::Outside;
             return;
         }
         self.vicinity.find(shape, from_m, swept, surface);
-        // What has been let go may have slipped in; what was inside may have come out.
-        if self.side == Side::Inside || released {
-            self.side = Side::Unknown;
-        }
-        if self.side == Side::Unknown {
-            let inside = is_inside(from_m, surface.points, surface.triangles);
-            self.side = if inside { Side::Inside } else { Side::Outside };
-        }
-        if self.side == Side::Inside {
-            let radius_m = shape.radius_m();
-            (self.vicinity).find_way_out(radius_m, from_m, surface, places);
-        }
         // Both lists are in the order of the surface.
         let mut near = (self.vicinity.near.iter().zip(0..)).peekable();
         self.touches.sort_unstable_by_key(|touch| touch.feature);
@@ -174,6 +152,11 @@ impl Contacts {
 
     /// Takes over where the surface is at the start of a substep.
     pub fn begin_substep(&mut self, from_m: Vec3, previous: &[Vec4]) {
+        self.pushed = Vec3::ZERO;
+        self.begin_substep_at(from_m, previous);
+    }
+
+    fn begin_substep_at(&mut self, from_m: Vec3, previous: &[Vec4]) {
         self.vicinity.begin_substep(from_m, previous);
         // What pressed goes on with what it pressed with.
         self.touches.retain_mut(Touch::begin_substep);
@@ -205,13 +188,72 @@ impl Contacts {
 
     /// Finds what touches the tool, and pushes it out, with friction. How far a place was moved at
     /// most [m].
-    pub fn solve(&mut self, tool: Motion, places: &mut [Vec4], substep_s: f32) -> f32 {
+    ///
+    /// A tool that goes farther than its own size goes in pieces: in one it would meet the tissue
+    /// from too many sides at once.
+    pub fn solve(
+        &mut self,
+        tool: Motion,
+        places: &mut [Vec4],
+        previous: &[Vec4],
+        substep_s: f32,
+    ) -> f32 {
+        let longest_m = self.vicinity.way_max_m(tool.to_m, places);
+        let pieces = longest_m / (PIECE_RADII * tool.shape.radius_m());
+        if pieces <= 1.0 {
+            return self.solve_piece(tool, places, substep_s);
+        }
+        let pieces = (pieces.ceil() as u32).min(PIECES_MAX);
+        let share = 1.0 / pieces as f32;
+        let way = share * (tool.to_m - tool.from_m);
+        // Back to where the substep started, and on in equal parts of the way from there.
+        let movers = self.vicinity.movers();
+        let parts: Vec<Vec4> = (movers.iter())
+            .map(|&mover| {
+                let mover = mover as usize;
+                let part = share * (places[mover] - previous[mover]);
+                places[mover] = previous[mover];
+                part
+            })
+            .collect();
+        let mut most_m = 0.0_f32;
+        for piece in 0..pieces {
+            let piece = Motion {
+                from_m: tool.from_m + piece as f32 * way,
+                to_m: tool.from_m + (piece + 1) as f32 * way,
+                ..tool
+            };
+            self.begin_piece(piece.from_m, places);
+            for (&mover, &part) in movers.iter().zip(&parts) {
+                places[mover as usize] += part;
+            }
+            most_m = most_m.max(self.solve_piece(piece, places, share * substep_s));
+        }
+        most_m
+    }
+
+    /// Starts a piece: what the last one pushed stays pushed.
+    fn begin_piece(&mut self, from_m: Vec3, places: &[Vec4]) {
+        self.pushed += self
+            .touches
+            .iter()
+            .map(|touch| touch.multiplier)
+            .sum::<Vec3>();
+        self.begin_substep_at(from_m, places);
+        for touch in &mut self.touches {
+            touch.guess = Vec3::ZERO;
+        }
+    }
+
+    fn solve_piece(&mut self, tool: Motion, places: &mut [Vec4], substep_s: f32) -> f32 {
+        // What is nearer than places are moved before the next look is kept an eye on.
+        let margin_m = LOOK_AGAIN_RADII * tool.shape.radius_m();
         let mut most_m = 0.0_f32;
         for _ in 0..LOOKS_MAX {
-            self.look(tool, places, substep_s, 0.0);
+            self.look(tool, places, substep_s, margin_m);
             let moved_m = self.push(tool, places);
             most_m = most_m.max(moved_m);
-            if moved_m <= LOOK_AGAIN_RADII * tool.shape.radius_m() {
+            if moved_m <= margin_m {
                 break;
             }
         }
@@ -249,14 +291,18 @@ impl Contacts {
 
     /// Force on the body times h² in this substep [kg m].
     pub fn multiplier(&self) -> Vec3 {
-        self.touches.iter().map(|touch| touch.multiplier).sum()
+        self.pushed
+            + self
+                .touches
+                .iter()
+                .map(|touch| touch.multiplier)
+                .sum::<Vec3>()
     }
 
     /// Looks where the surface is now, and brings the touches up to date. Places up to `margin_m`
     /// away are taken too.
     pub fn look(&mut self, tool: Motion, places: &[Vec4], substep_s: f32, margin_m: f32) {
         let leave_m = DEPENETRATION_SPEED_M_S * substep_s;
-        let inside = self.side == Side::Inside;
         let Vicinity {
             near,
             points,
@@ -286,17 +332,14 @@ impl Contacts {
                 way_m,
                 margin_m,
             };
-            let found = if inside {
-                Some(seen.found_inside())
-            } else {
-                let known = near.touch.map(|touch| self.touches[touch as usize].normal);
-                seen.found_outside(near, known)
+            let known = near.touch.map(|touch| self.touches[touch as usize].normal);
+            let Some(found) = seen.find(near, known) else {
+                continue;
             };
-            let Some(found) = found else { continue };
             // Corners are held for themselves.
             let at_corner = found.weights.max_element() == 1.0;
             let is_point = matches!(near.feature, Feature::Point { .. });
-            if at_corner && !is_point && !inside && near.touch.is_none() {
+            if at_corner && !is_point && near.touch.is_none() {
                 continue;
             }
             let carriers = near.carriers(carriers, corners);
@@ -358,28 +401,17 @@ impl Contacts {
         moved_m
     }
 
-    /// Deepest that the tool is inside the surface, at the end of a step [m]; 0 or less outside.
+    /// How far a tool at `position_m`, outside the surface, reaches into it at most [m].
     pub fn penetration_m(&self, shape: ToolShape, position_m: Vec3, points: &[Vec3]) -> f32 {
-        let radius = shape.radius_m();
-        let depth = |near: &Near| {
+        let depth_m = |near: &Near| {
             let corners = near.corners.map(|k| {
                 let index = self.vicinity.points[k as usize].point;
                 points[index as usize] - position_m
             });
-            let found = nearest(near.feature.axis(shape), corners);
-            if self.side == Side::Inside && found.normal(corners).dot(outwards(corners)) > 0.0 {
-                radius + found.distance_m()
-            } else {
-                radius - found.distance_m()
-            }
+            shape.radius_m() - nearest(near.feature.axis(shape), corners).distance_m()
         };
-        self.vicinity.near.iter().map(depth).fold(0.0, f32::max)
+        self.vicinity.near.iter().map(depth_m).fold(0.0, f32::max)
     }
-}
-
-/// Not of length 1.
-fn outwards([a, b, c]: [Vec3; 3]) -> Vec3 {
-    (b - a).cross(c - a)
 }
 
 /// A triangle that may touch, in the frame of the tool.
@@ -403,8 +435,9 @@ struct Found {
 }
 
 impl Seen {
-    /// A triangle that was outside the tool, or nearly so, when the substep started.
-    fn found_outside(&self, near: &mut Near, known: Option<Vec3>) -> Option<Found> {
+    /// Where it comes to the tool, if it does. It was outside, or nearly so, when the substep
+    /// started.
+    fn find(&self, near: &mut Near, known: Option<Vec3>) -> Option<Found> {
         let slow = self.way_m < PASSING_SHARE * (near.clear_m + self.radius_m);
         if slow && self.way_m < SLOW_RADII * self.radius_m {
             let found = nearest(self.axis, self.end);
@@ -448,24 +481,6 @@ impl Seen {
         }
     }
 
-    /// The triangle that is to be drawn over a tool inside the body.
-    fn found_inside(&self) -> Found {
-        let tip = [self.axis[0]; 2];
-        let signed = |corners: [Vec3; 3]| {
-            let found = nearest(tip, corners);
-            let direction = found.normal(corners);
-            let side = if direction.dot(outwards(corners)) > 0.0 {
-                -1.0
-            } else {
-                1.0
-            };
-            (found, side * direction, side * found.distance_m())
-        };
-        let (found, normal, _) = signed(self.end);
-        let (_, _, start_m) = signed(self.start);
-        self.found(found, normal, start_m - self.radius_m)
-    }
-
     /// The normal of the nearest place, and whether the place is on the side of the axis where it
     /// was in the last substep: 1 if so, −1 if the axis has gone through the face since.
     fn on_its_side(&self, found: &Nearest, corners: [Vec3; 3], known: Option<Vec3>) -> (Vec3, f32) {
@@ -487,3 +502,6 @@ impl Seen {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -93,10 +93,10 @@ impl Particles {
         frozen
     }
 
-    /// Longest way of a particle since the step started [m].
-    pub fn way_max_m(&self) -> f32 {
-        (self.places.iter().zip(&self.finite))
-            .map(|(now, then)| (*now - *then).truncate().length_squared())
+    /// Farthest that a particle is from its place in `others` [m].
+    pub fn farthest_m(&self, others: &[Vec4]) -> f32 {
+        (self.places.iter().zip(others))
+            .map(|(place, other)| (*place - *other).truncate().length_squared())
             .fold(0.0, f32::max)
             .sqrt()
     }

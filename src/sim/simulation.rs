@@ -2,7 +2,7 @@
 
 use super::{
     BodySetup, SolverParams, StepReport, ToolInput,
-    contact::Surface,
+    contact::{DEPENETRATION_SPEED_M_S, Surface},
     diagnose::{rest_volume_m3, volume_and_inverted},
     grab::Tissue,
     model::Model,
@@ -11,14 +11,14 @@ use super::{
     tools::{Met, Tools},
 };
 use crate::geom::bounds;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-/// A body that moves in a step by less than this many of its sizes a second is calm.
-const CALM_SIZES_PER_S: f32 = 5e-4;
-/// So many calm steps in a row put it to sleep: half a second, longer than it hangs still at the
-/// turning point of a swing.
-const CALM_STEPS: u32 = 30;
+/// A body that goes nowhere by more than this many of its sizes is calm.
+const CALM_SIZES: f32 = 1e-4;
+/// Calm for so long, it falls asleep [s]: longer than it hangs still at the turning point of a
+/// swing.
+const CALM_S: f32 = 0.5;
 /// A smaller body has colours too small to share.
 const SHARED_TETS_MIN: usize = 3000;
 /// Points a task, in bringing the surface up to date.
@@ -45,6 +45,9 @@ pub struct Simulation {
     points: Vec<Vec3>,
     point_bounds: (Vec3, Vec3),
     report: StepReport,
+    /// Where the particles were when they last were not calm [m], and for how many steps they have
+    /// been near there.
+    calm_places: Vec<Vec4>,
     calm_steps: u32,
     frozen: usize,
     pool: Option<rayon::ThreadPool>,
@@ -86,6 +89,7 @@ impl Simulation {
             points: vec![Vec3::ZERO; setup.embedding.particles.len()],
             point_bounds: (Vec3::ZERO, Vec3::ZERO),
             report: StepReport::default(),
+            calm_places: Vec::new(),
             calm_steps: 0,
             frozen: 0,
             pool: None,
@@ -98,6 +102,7 @@ impl Simulation {
             solver: params,
             setup,
         };
+        simulation.calm_places = simulation.particles.places.clone();
         simulation.publish();
         simulation
     }
@@ -284,12 +289,7 @@ impl Simulation {
         self.tools.begin_step(
             inputs,
             Met {
-                surface: Surface {
-                    triangles: &self.setup.triangles,
-                    points: &self.points,
-                    bounds: self.point_bounds,
-                    embedding: &self.setup.embedding,
-                },
+                surface: surface(&self.setup, &self.points, self.point_bounds),
                 particles: &self.particles,
                 tissue: Tissue {
                     youngs_modulus_pa: self.solver.youngs_modulus_pa,
@@ -298,6 +298,7 @@ impl Simulation {
                 },
                 size_m: self.size_m,
                 way_m: 2.0 * speed_m_s * self.solver.timestep_s,
+                enter_m: DEPENETRATION_SPEED_M_S * self.solver.timestep_s,
                 asleep,
             },
         );
@@ -335,21 +336,26 @@ impl Simulation {
         self.publish();
         let (volume, inverted_tets) = volume_and_inverted(&self.positions, &self.sound_tets);
         let speed_max_m_s = self.particles.speed_max_m_s();
-        // By the way in the step: where something presses, light particles tremble by rounding.
-        let way_m = self.particles.way_max_m();
-        let calm = !stirred && way_m < CALM_SIZES_PER_S * self.size_m * self.solver.timestep_s;
-        self.calm_steps = if calm { self.calm_steps + 1 } else { 0 };
+        // By the way and not the speed: where something presses, light particles tremble.
+        let way_max_m = CALM_SIZES * self.size_m;
+        if stirred || self.particles.farthest_m(&self.calm_places) > way_max_m {
+            self.calm_places.copy_from_slice(&self.particles.places);
+            self.calm_steps = 0;
+        } else {
+            self.calm_steps += 1;
+        }
+        let surface = surface(&self.setup, &self.points, self.point_bounds);
         self.report = StepReport {
             residual_rms,
             volume_drift: (volume / self.rest_volume_m3 - 1.0) as f32,
             tool_forces_n: self.tools.forces_n(self.solver.substeps),
-            penetration_max_m: self.tools.penetration_max_m(&self.points),
+            penetration_max_m: (self.tools).penetration_max_m(surface, &self.particles),
             inverted_tets,
             frozen_particles: self.frozen,
             speed_max_m_s,
             asleep: false,
         };
-        if self.calm_steps >= CALM_STEPS {
+        if self.calm_steps >= (CALM_S / self.solver.timestep_s).round() as u32 {
             self.particles.velocities.fill(Vec3::ZERO);
             self.report.asleep = true;
             self.report.speed_max_m_s = 0.0;
@@ -393,6 +399,16 @@ impl Simulation {
                     .sum();
             });
         self.point_bounds = bounds(&self.points);
+    }
+}
+
+/// The surface as the tools meet it.
+fn surface<'a>(setup: &'a BodySetup, points: &'a [Vec3], bounds: (Vec3, Vec3)) -> Surface<'a> {
+    Surface {
+        triangles: &setup.triangles,
+        points,
+        bounds,
+        embedding: &setup.embedding,
     }
 }
 

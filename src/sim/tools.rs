@@ -2,7 +2,7 @@
 
 use super::{
     ToolAction, ToolInput, ToolShape,
-    contact::{ActiveContact, Contacts, Motion, Surface, SweptBox},
+    contact::{self, ActiveContact, Contacts, Motion, Surface, SweptBox},
     grab::{Grab, Tissue},
     particles::Particles,
 };
@@ -23,8 +23,14 @@ const ROOM_RADII: f32 = 0.1;
 #[derive(Clone, Debug)]
 struct Tool {
     input: ToolInput,
-    /// Where it was when the step started [m].
+    /// Where it was when the step started, and where it will be when it ends [m].
     from_m: Vec3,
+    to_m: Vec3,
+    /// How far what touches the body is from there [m]: a tool found inside the body is taken to be
+    /// outside the nearest part of its surface, and comes in from there.
+    behind_m: Vec3,
+    /// Whether it is known to be outside, or else where outside it is taken to be.
+    side_known: bool,
     /// Whether it is as it was in the last step.
     still: bool,
     /// Whether it has changed since it touched or held the body in the last step.
@@ -57,6 +63,8 @@ pub struct Met<'a> {
     pub size_m: f32,
     /// How far a particle may get in a step [m].
     pub way_m: f32,
+    /// How far a tool found inside comes in from outside in a step [m].
+    pub enter_m: f32,
     /// Nothing has moved since the last step.
     pub asleep: bool,
 }
@@ -76,6 +84,9 @@ impl Tools {
                         ..input
                     },
                     from_m: input.position_m,
+                    to_m: input.position_m,
+                    behind_m: Vec3::ZERO,
+                    side_known: false,
                     still: false,
                     let_go: false,
                     closes: false,
@@ -114,7 +125,7 @@ impl Tools {
     /// Forgets on which side of the surface each tool is: the body was put elsewhere.
     pub fn forget_sides(&mut self) {
         for tool in &mut self.tools {
-            tool.contacts.forget_side();
+            tool.side_known = false;
         }
     }
 
@@ -146,7 +157,7 @@ impl Tools {
     /// Pushes and pulls the particles once. The substep lies between the shares `from` and `to` of
     /// the step.
     pub fn solve(&mut self, particles: &mut Particles, from: f32, to: f32, substep_s: f32) {
-        let places = &mut particles.places;
+        let (places, previous) = (&mut particles.places, &particles.previous);
         let busy = |tool: &&Tool| tool.grab.is_some() || tool.contacts.is_near();
         let turns = match self.tools.iter().filter(busy).count() {
             0 | 1 => 1,
@@ -164,7 +175,8 @@ impl Tools {
             let mut moved_m = 0.0_f32;
             for tool in &mut self.tools {
                 let motion = tool.motion(from, to);
-                moved_m = moved_m.max(tool.contacts.solve(motion, places, substep_s));
+                let contacts = &mut tool.contacts;
+                moved_m = moved_m.max(contacts.solve(motion, places, previous, substep_s));
             }
             most_m = most_m.max(moved_m);
             if moved_m <= SETTLED_SHARE * most_m {
@@ -230,13 +242,10 @@ impl Tools {
     }
 
     /// Deepest that a pushing tool is inside the surface at the end of a step [m]; 0 if none is.
-    pub fn penetration_max_m(&self, points: &[Vec3]) -> f32 {
+    pub fn penetration_max_m(&self, surface: Surface, particles: &Particles) -> f32 {
         self.tools
             .iter()
-            .map(|tool| {
-                let (shape, position_m) = (tool.input.shape, tool.input.position_m);
-                tool.contacts.penetration_m(shape, position_m, points)
-            })
+            .map(|tool| tool.penetration_m(surface, particles))
             .fold(0.0, f32::max)
     }
 }
@@ -255,8 +264,13 @@ impl Tool {
         self.let_go = !self.still && self.acts();
         self.closes = !goes_on && input.action == ToolAction::Grab;
         let same_kind = discriminant(&before.shape) == discriminant(&input.shape);
+        self.to_m = input.position_m;
         if !(goes_on && same_kind) {
             self.contacts.clear();
+        }
+        if !goes_on {
+            self.behind_m = Vec3::ZERO;
+            self.side_known = false;
         }
         if !goes_on {
             self.grab = None;
@@ -269,10 +283,11 @@ impl Tool {
         let shape = self.input.shape;
         let places = &body.particles.places;
         if self.input.action == ToolAction::Push {
-            let ends = [self.from_m, self.input.position_m];
+            self.find_side(body);
+            let ends = [self.from_m, self.to_m];
             let room_m = ROOM_RADII * shape.radius_m() + body.way_m;
             let swept = SweptBox::new(shape, ends, room_m);
-            (self.contacts).begin_step(shape, self.from_m, swept, body.surface, places);
+            (self.contacts).begin_step(shape, self.from_m, swept, body.surface);
         }
         if self.closes {
             self.grab = Grab::close(
@@ -286,6 +301,49 @@ impl Tool {
         }
     }
 
+    /// Where outside the body it starts the step, and where it ends it.
+    fn find_side(&mut self, body: Met) {
+        let radius_m = self.input.shape.radius_m();
+        let is_behind = self.behind_m != Vec3::ZERO;
+        if self.contacts.lets_go() {
+            self.side_known = false;
+        }
+        if !self.side_known || is_behind {
+            let (low, high) = body.surface.bounds;
+            let (points, triangles) = (body.surface.points, body.surface.triangles);
+            let inside = self.from_m.cmpge(low).all()
+                && self.from_m.cmple(high).all()
+                && contact::is_inside(self.from_m, points, triangles);
+            if inside && !is_behind {
+                let way = contact::way_out(self.from_m, body.surface, &body.particles.places);
+                let way = way.unwrap_or_default();
+                self.behind_m = way + radius_m * way.normalize_or_zero();
+            } else if !inside && self.behind_m.length() > radius_m {
+                self.behind_m = Vec3::ZERO; // It has come out by itself.
+            }
+            self.side_known = true;
+        }
+        let behind_m = self.behind_m.length();
+        let nearer_m = (behind_m - body.enter_m).max(0.0);
+        self.from_m += self.behind_m;
+        self.behind_m *= nearer_m / behind_m.max(f32::MIN_POSITIVE);
+        self.to_m += self.behind_m;
+    }
+
+    fn penetration_m(&self, surface: Surface, particles: &Particles) -> f32 {
+        if self.input.action != ToolAction::Push {
+            return 0.0;
+        }
+        let (shape, at_m) = (self.input.shape, self.input.position_m);
+        if self.behind_m != Vec3::ZERO
+            && contact::is_inside(at_m, surface.points, surface.triangles)
+        {
+            let way = contact::way_out(at_m, surface, &particles.places);
+            return shape.radius_m() + way.unwrap_or_default().length();
+        }
+        self.contacts.penetration_m(shape, at_m, surface.points)
+    }
+
     /// Whether it touched or held the body in the last substep.
     fn acts(&self) -> bool {
         self.grab.is_some() || self.contacts.pressed()
@@ -293,11 +351,11 @@ impl Tool {
 
     /// Where it is at this share of the step [m].
     fn at(&self, share: f32) -> Vec3 {
-        self.from_m.lerp(self.input.position_m, share)
+        self.from_m.lerp(self.to_m, share)
     }
 
     fn way_m(&self) -> f32 {
-        self.from_m.distance(self.input.position_m)
+        self.from_m.distance(self.to_m)
     }
 
     fn motion(&self, from: f32, to: f32) -> Motion {

@@ -1,6 +1,7 @@
-//! Whether a place is inside a closed surface.
+//! Whether a place is inside a closed surface, and the way out.
 
-use glam::{DVec3, Vec3};
+use super::{near::Surface, nearest::nearest};
+use glam::{DVec3, Vec3, Vec4};
 
 /// Three directions that no made surface has an edge along.
 const DIRECTIONS: [DVec3; 3] = [
@@ -41,6 +42,19 @@ fn leaves_minus_enters(x: DVec3, direction: DVec3, points: &[Vec3], triangles: &
         }
     }
     count
+}
+
+/// The way from a place inside to the nearest place of the surface that can move [m]; `None` if
+/// none can.
+pub fn way_out(x: Vec3, surface: Surface, places: &[Vec4]) -> Option<Vec3> {
+    let moves = |corners: &&[u32; 3]| {
+        (corners.iter())
+            .flat_map(|&point| surface.embedding.particles[point as usize])
+            .any(|particle| places[particle as usize].w > 0.0)
+    };
+    (surface.triangles.iter().filter(moves))
+        .map(|corners| nearest([x; 2], corners.map(|k| surface.points[k as usize])).offset)
+        .min_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))
 }
 
 #[cfg(test)]

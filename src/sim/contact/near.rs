@@ -264,28 +264,22 @@ impl Vicinity {
         }
     }
 
-    /// Lists only the triangle that is nearest to a tip inside the body and can move.
-    pub fn find_way_out(&mut self, radius_m: f32, tip_m: Vec3, surface: Surface, places: &[Vec4]) {
-        self.clear();
-        let moves = |triangle: &[u32; 3]| {
-            (triangle.iter())
-                .flat_map(|&point| surface.embedding.particles[point as usize])
-                .any(|particle| places[particle as usize].w > 0.0)
-        };
-        let squared_m2 = |triangle: &[u32; 3]| {
-            let corners = triangle.map(|point| surface.points[point as usize]);
-            nearest([tip_m; 2], corners).offset.length_squared()
-        };
-        let way_out = (surface.triangles.iter().zip(0..))
-            .filter(|(corners, _)| moves(corners))
-            .min_by(|(a, _), (b, _)| squared_m2(a).total_cmp(&squared_m2(b)));
-        if let Some((corners, triangle)) = way_out {
-            let feature = Feature::Triangle { half: 0, triangle };
-            let tip = ToolShape::Sphere { radius_m };
-            self.add(feature, *corners, tip, tip_m, f32::INFINITY, surface);
-            self.near[0].clear_m = f32::NEG_INFINITY;
-        }
-        self.close();
+    /// Longest way of a point in this substep in the frame of a tool that ends it at `to_m` [m].
+    pub fn way_max_m(&self, to_m: Vec3, places: &[Vec4]) -> f32 {
+        (self.points.iter())
+            .map(|point| point.start.distance_squared(point.place(places) - to_m))
+            .fold(0.0, f32::max)
+            .sqrt()
+    }
+
+    /// The particles that carry the points, each once.
+    pub fn movers(&self) -> Vec<u32> {
+        let mut movers: Vec<u32> = (self.points.iter())
+            .flat_map(|point| point.particles)
+            .collect();
+        movers.sort_unstable();
+        movers.dedup();
+        movers
     }
 
     /// Takes over where the points are at the start of a substep.

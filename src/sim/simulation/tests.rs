@@ -1,5 +1,11 @@
 //! The whole step: rest, sag, contact, grab, and what must not depend on threads.
 
+mod contact;
+mod grab;
+mod hertz;
+mod pokes;
+mod sleep;
+
 use super::*;
 use crate::geom::SurfaceMesh;
 use crate::geom::lattice::{Lattice, block, sphere};
@@ -7,6 +13,8 @@ use crate::sim::{Method, ToolAction, ToolShape, diagnose};
 use proptest::prelude::*;
 
 const DENSITY: f32 = 1000.0;
+/// Steps after which a calm body falls asleep.
+const CALM_STEPS: u32 = 30;
 const DOWN: Vec3 = Vec3::new(0.0, -9.81, 0.0);
 
 /// A block of tissue, free of gravity and damping.
