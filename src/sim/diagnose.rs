@@ -95,7 +95,7 @@ fn elastic_energy_j(simulation: &Simulation) -> f64 {
                     0.5 * bulk * change.powi(2) / volume
                 })
         }
-        Method::XpbdNeoHookean => tets(&|x, volume, tet| {
+        Method::Implicit | Method::XpbdNeoHookean => tets(&|x, volume, tet| {
             let [a, b, c, d] =
                 mesh.tets[tet as usize].map(|i| mesh.particles[i as usize].as_dvec3());
             let rest = DMat3::from_cols(b - a, c - a, d - a);

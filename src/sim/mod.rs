@@ -10,6 +10,7 @@ mod contact;
 pub mod diagnose;
 mod grab;
 mod handle;
+mod implicit;
 mod lanes;
 mod mass_spring;
 mod model;
@@ -35,19 +36,28 @@ pub enum Method {
     MassSpring,
     /// Compliant edge lengths and tetrahedron volumes, XPBD.
     XpbdSprings,
+    /// Stable neo-Hookean tetrahedra, each substep solved as a whole: for stiff bodies, long
+    /// substeps, and states that are to be right to the last digit.
+    Implicit,
     /// Stable neo-Hookean tetrahedra, shape and volume solved together, XPBD.
     XpbdNeoHookean,
 }
 
 impl Method {
     /// Every method, the recommended one last.
-    pub const ALL: [Self; 3] = [Self::MassSpring, Self::XpbdSprings, Self::XpbdNeoHookean];
+    pub const ALL: [Self; 4] = [
+        Self::MassSpring,
+        Self::XpbdSprings,
+        Self::Implicit,
+        Self::XpbdNeoHookean,
+    ];
 
     /// The name scene files use.
     pub fn name(self) -> &'static str {
         match self {
             Self::MassSpring => "mass-spring",
             Self::XpbdSprings => "xpbd-springs",
+            Self::Implicit => "implicit",
             Self::XpbdNeoHookean => "xpbd-neo-hookean",
         }
     }

@@ -1,8 +1,8 @@
 //! The elastic model of a body, one of a closed set.
 
 use super::{
-    Method, SolverParams, mass_spring::MassSpring, neo_hookean::NeoHookean, springs::Springs,
-    team::Team,
+    Method, SolverParams, implicit::Implicit, mass_spring::MassSpring, neo_hookean::NeoHookean,
+    springs::Springs, team::Team,
 };
 use crate::geom::TetMesh;
 use glam::Vec4;
@@ -13,14 +13,26 @@ pub enum Model {
     MassSpring(MassSpring),
     Springs(Springs),
     NeoHookean(NeoHookean),
+    /// Solves substeps as a whole, tools and all.
+    Implicit(Box<Implicit>),
 }
 
 impl Model {
-    /// The model of `method` for the tetrahedra `sound` of `mesh`, of which `fill` is tissue.
-    pub fn new(method: Method, mesh: &TetMesh, sound: &[u32], fill: &[f32]) -> Self {
+    /// The model of `method` for the tetrahedra `sound` of `mesh`, of which `fill` is tissue, and
+    /// particles with the inverse masses in `places`.
+    pub fn new(
+        method: Method,
+        mesh: &TetMesh,
+        sound: &[u32],
+        fill: &[f32],
+        places: &[Vec4],
+    ) -> Self {
         match method {
             Method::MassSpring => Self::MassSpring(MassSpring::new(mesh, sound, fill)),
             Method::XpbdSprings => Self::Springs(Springs::new(mesh, sound, fill)),
+            Method::Implicit => {
+                Self::Implicit(Box::new(Implicit::new(mesh, sound, fill, places)))
+            }
             Method::XpbdNeoHookean => Self::NeoHookean(NeoHookean::new(mesh, sound, fill)),
         }
     }
@@ -42,6 +54,7 @@ impl Model {
                 None
             }
             Self::NeoHookean(model) => Some(model.begin_substep(team, particles, params)),
+            Self::Implicit(_) => None,
         }
     }
 
@@ -50,6 +63,7 @@ impl Model {
         match self {
             Self::MassSpring(_) | Self::Springs(_) => {}
             Self::NeoHookean(model) => model.forget(particles, params),
+            Self::Implicit(model) => model.forget(),
         }
     }
 
@@ -57,7 +71,30 @@ impl Model {
     pub fn is_restoring(&self) -> bool {
         match self {
             Self::MassSpring(_) | Self::Springs(_) => false,
+            // What it leads back it stops itself.
+            Self::Implicit(_) => false,
             Self::NeoHookean(model) => model.is_restoring(),
+        }
+    }
+
+    /// Starts a time step.
+    pub fn begin_step(&mut self) {
+        if let Self::Implicit(model) = self {
+            model.begin_step();
+        }
+    }
+
+    /// Takes over that all velocities were set to zero.
+    pub fn stand_still(&mut self) {
+        if let Self::Implicit(model) = self {
+            model.forget();
+        }
+    }
+
+    /// Has velocities damped by a factor, if the model has any but the particles' own.
+    pub fn damp(&mut self, factor: f32) {
+        if let Self::Implicit(model) = self {
+            model.damp(factor);
         }
     }
 
@@ -65,7 +102,7 @@ impl Model {
     pub fn project(&mut self, team: &Team, particles: &mut [Vec4], params: &SolverParams) {
         let (lame, substep_s) = (params.lame(), params.substep_s());
         match self {
-            Self::MassSpring(_) => {}
+            Self::MassSpring(_) | Self::Implicit(_) => {}
             Self::Springs(model) => model.project(team, particles, lame, substep_s),
             Self::NeoHookean(model) => model.project(team, particles),
         }
@@ -76,6 +113,7 @@ impl Model {
     /// without constraints.
     pub fn residual_rms(&mut self, particles: &mut [Vec4], params: &SolverParams) -> f32 {
         let (sum, count) = match self {
+            Self::Implicit(model) => return model.residual_share(),
             Self::MassSpring(_) => (0.0, 0),
             Self::Springs(model) => model.residual(particles, params.lame(), params.substep_s()),
             Self::NeoHookean(model) => {

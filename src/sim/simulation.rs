@@ -5,6 +5,7 @@ use super::{
     contact::{DEPENETRATION_SPEED_M_S, Surface},
     diagnose::{rest_volume_m3, volume_and_inverted},
     grab::Tissue,
+    implicit::Step,
     model::Model,
     particles::Particles,
     team::Team,
@@ -81,9 +82,10 @@ impl Simulation {
         let rest_volume_m3 = volume_and_inverted(&mesh.particles, &sound_tets).0;
         // The edge of a regular tetrahedron of the mean volume.
         let mean_volume = rest_volume_m3 / sound.len().max(1) as f64;
+        let particles = Particles::new(&mesh.particles, &inverse_masses(&setup));
         let mut simulation = Self {
-            model: Model::new(params.method, mesh, &sound, &setup.fill),
-            particles: Particles::new(&mesh.particles, &inverse_masses(&setup)),
+            model: Model::new(params.method, mesh, &sound, &setup.fill, &particles.places),
+            particles,
             tools: Tools::default(),
             positions: mesh.particles.clone(),
             points: vec![Vec3::ZERO; setup.embedding.particles.len()],
@@ -144,8 +146,8 @@ impl Simulation {
             return;
         }
         if params.method != self.solver.method {
-            let (mesh, fill) = (&self.setup.tets, &self.setup.fill);
-            self.model = Model::new(params.method, mesh, &self.sound, fill);
+            self.solver.method = params.method;
+            self.model = self.new_model();
         }
         self.solver = params;
         self.wake();
@@ -274,8 +276,14 @@ impl Simulation {
             Model::MassSpring(model) => {
                 Some(model.stable_substep_s(&self.particles.places, self.solver.youngs_modulus_pa))
             }
-            Model::Springs(_) | Model::NeoHookean(_) => None,
+            Model::Springs(_) | Model::NeoHookean(_) | Model::Implicit(_) => None,
         }
+    }
+
+    fn new_model(&self) -> Model {
+        let (mesh, fill) = (&self.setup.tets, &self.setup.fill);
+        let places = &self.particles.places;
+        Model::new(self.solver.method, mesh, &self.sound, fill, places)
     }
 
     fn wake(&mut self) {
@@ -310,6 +318,7 @@ impl Simulation {
         }
 
         self.particles.keep_finite();
+        self.model.begin_step();
         let shared = self.sound.len() >= SHARED_TETS_MIN;
         let mut lead = |team: &Team| {
             for substep in 0..self.solver.substeps {
@@ -330,7 +339,13 @@ impl Simulation {
         for velocity in &mut self.particles.velocities {
             *velocity *= damping;
         }
-        self.frozen += self.particles.freeze_if_not_finite();
+        self.model.damp(damping);
+        let frozen = self.particles.freeze_if_not_finite();
+        self.frozen += frozen;
+        if frozen > 0 && matches!(self.model, Model::Implicit(_)) {
+            // It numbers free particles and held ones apart.
+            self.model = self.new_model();
+        }
 
         let residual_rms = (self.model).residual_rms(&mut self.particles.places, &self.solver);
         self.publish();
@@ -357,6 +372,7 @@ impl Simulation {
         };
         if self.calm_steps >= (CALM_S / self.solver.timestep_s).round() as u32 {
             self.particles.velocities.fill(Vec3::ZERO);
+            self.model.stand_still();
             self.report.asleep = true;
             self.report.speed_max_m_s = 0.0;
         }
@@ -367,6 +383,16 @@ impl Simulation {
         let substep_s = self.solver.substep_s();
         let share = |k: u32| k as f32 / self.solver.substeps as f32;
         let (from, to) = (share(substep), share(substep + 1));
+        if let Model::Implicit(model) = &mut self.model {
+            let step = Step {
+                gravity_m_s2: self.setup.gravity_m_s2,
+                lame: self.solver.lame(),
+                substep_s,
+                iterations: self.solver.iterations,
+            };
+            model.substep(&mut self.particles, step);
+            return;
+        }
         let accelerations =
             (self.model).begin_substep(team, &mut self.particles.places, &self.solver);
         self.particles

@@ -1,0 +1,336 @@
+//! The implicit method: stable neo-Hookean tetrahedra, each substep solved as a whole.
+//!
+//! A substep of length h ends where
+//!
+//! u₁ = 4/3 u₀ − 1/3 u₋₁ + τ v₁,  v₁ = 4/3 v₀ − 1/3 v₋₁ + τ a(u₁),  τ = 2/3 h:
+//!
+//! the backward differentiation formula of second order (BDF2), which is L-stable: there is no limit
+//! on the substep, what is stiff comes to rest, and little is lost of a slow swing. The end of the
+//! substep is the minimum of an energy, found by Newton's method. Where there is no past, because the
+//! body was put where it is, one with the acceleration that the forces give is made up.
+//!
+//! Source: Hairer, Wanner, "Solving Ordinary Differential Equations II", 2nd ed., 1996, ch. V.1.
+
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+mod band;
+mod cg;
+mod element;
+mod elements;
+mod galerkin;
+mod lattice;
+mod matrix;
+mod multigrid;
+mod newton;
+mod order;
+mod restore;
+mod strips;
+mod sweep;
+mod wide;
+
+use super::{Lame, particles::Particles};
+use crate::geom::TetMesh;
+use element::{Element, PAIRS};
+use elements::Elements;
+use glam::{DVec3, DVec4, Vec3, Vec4};
+use matrix::BlockMatrix;
+use multigrid::Multigrid;
+use newton::{Goal, Newton, State};
+use order::Order;
+use restore::Wreck;
+pub use newton::Work;
+
+/// The implicit share of a substep, τ/h.
+const IMPLICIT_SHARE: f64 = 2.0 / 3.0;
+/// Forces beyond so many times the weight come from no motion that a past could be made up for.
+const SMOOTH_WEIGHTS: f64 = 2.0;
+
+/// What a substep is taken with.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    pub gravity_m_s2: Vec3,
+    pub lame: Lame,
+    /// Length [s].
+    pub substep_s: f32,
+    /// Newton steps a stage, at most.
+    pub iterations: u32,
+}
+
+/// A body whose substeps are solved as a whole.
+#[derive(Clone, Debug)]
+pub struct Implicit {
+    order: Order,
+    /// Places of the nodes at rest [m].
+    rest: Vec<DVec3>,
+    masses_kg: Vec<f64>,
+    newton: Newton,
+    goal: Goal,
+    /// Displacement of each node, and 0 for one that no particle owns [m].
+    now: Vec<DVec4>,
+    /// The same a substep ago [m].
+    before: Vec<DVec4>,
+    /// Velocity of each free node a substep ago [m/s].
+    velocities_before: Vec<DVec4>,
+    /// The substep the past was made with [s]; `None` if there is none.
+    past_substep_s: Option<f32>,
+    /// Where each particle was put last, to see whether somebody else has moved it.
+    published: Vec<Vec4>,
+    /// Displacements that are worked on [m].
+    next: Vec<DVec4>,
+    /// Displacements when the body was last sound [m].
+    sound: Vec<DVec4>,
+    /// Elastic energy at `now`; `None` if that was not the end of a substep [J].
+    elastic_j: Option<f64>,
+    /// Residual over load after the last substep.
+    residual_share: f64,
+}
+
+impl Implicit {
+    /// Tetrahedra `sound` of `mesh`, of which `fill` is the share that is tissue, with particles
+    /// as in `places` [m, 1/kg].
+    pub fn new(mesh: &TetMesh, sound: &[u32], fill: &[f32], places: &[Vec4]) -> Self {
+        let particles: Vec<DVec3> = mesh.particles.iter().map(|x| x.as_dvec3()).collect();
+        let order = Order::new(&particles, |i| places[i].w > 0.0);
+        let in_order = |i: &u32| particles[*i as usize];
+        let rest: Vec<DVec3> = order.particle.iter().map(in_order).collect();
+        let mut elements: Vec<Element> = Vec::with_capacity(sound.len());
+        for &tet in sound {
+            let mut nodes = mesh.tets[tet as usize].map(|i| order.node[i as usize]);
+            nodes.sort_unstable();
+            let fill = f64::from(fill[tet as usize]);
+            elements.push(Element { nodes, fill });
+        }
+        elements.sort_by_key(|element| order.rank[element.nodes[0] as usize]);
+        let volume_m3: f64 = elements.iter().map(|e| e.shape(&rest).1 / e.fill).sum();
+        let pairs = elements
+            .iter()
+            .flat_map(|e| PAIRS.map(|(a, b)| (e.nodes[a], e.nodes[b])))
+            .filter(|&(_, b)| (b as usize) < order.free);
+        let matrix = BlockMatrix::new(order.free, pairs);
+        let spacing_m = (volume_m3 / order.free.max(1) as f64).cbrt();
+        let multigrid = Multigrid::new(&matrix, &rest[..order.free], spacing_m);
+        let elements = Elements::new(&elements, &rest, &matrix);
+        let mass_kg = |&i: &u32| 1.0 / f64::from(places[i as usize].w);
+        let count = rest.len();
+        Self {
+            masses_kg: order.particle[..order.free].iter().map(mass_kg).collect(),
+            newton: Newton::new(elements, matrix, multigrid, count),
+            goal: Goal {
+                free: vec![DVec4::ZERO; order.free],
+                ..Goal::default()
+            },
+            now: vec![DVec4::ZERO; count + 1],
+            before: vec![DVec4::ZERO; count + 1],
+            velocities_before: vec![DVec4::ZERO; order.free],
+            past_substep_s: None,
+            published: mesh.particles.iter().map(|x| x.extend(0.0)).collect(),
+            next: vec![DVec4::ZERO; count + 1],
+            sound: vec![DVec4::ZERO; count + 1],
+            elastic_j: None,
+            residual_share: 0.0,
+            rest,
+            order,
+        }
+    }
+
+    /// What is left of the forces after the last substep, over the forces that move the body.
+    pub fn residual_share(&self) -> f32 {
+        self.residual_share as f32
+    }
+
+    /// What was done since the last call.
+    pub fn take_work(&mut self) -> Work {
+        std::mem::take(&mut self.newton.work)
+    }
+
+    /// Forgets the past: the body was put where it is.
+    pub fn forget(&mut self) {
+        self.past_substep_s = None;
+    }
+
+    /// Has all velocities damped by a factor, those of the past as well; the particles' own are
+    /// the caller's.
+    pub fn damp(&mut self, factor: f32) {
+        for velocity in &mut self.velocities_before {
+            *velocity *= f64::from(factor);
+        }
+    }
+
+    /// Starts a time step.
+    pub fn begin_step(&mut self) {
+        self.newton.begin_step();
+    }
+
+    /// Advances the particles by a substep.
+    pub fn substep(&mut self, particles: &mut Particles, step: Step) {
+        self.take_over(particles);
+        let h = f64::from(step.substep_s);
+        let tau = IMPLICIT_SHARE * h;
+        let gravity = step.gravity_m_s2.as_dvec3().extend(0.0);
+        let inertia = self.masses_kg.iter().map(|&mass| mass / (tau * tau));
+        self.goal.inertia.clear();
+        self.goal.inertia.extend(inertia);
+        if self.past_substep_s != Some(step.substep_s) {
+            self.make_up_past(particles, step);
+        }
+        for (node, &particle) in self.order.particle[..self.order.free].iter().enumerate() {
+            let velocity = particles.velocities[particle as usize].as_dvec3().extend(0.0);
+            let (now, before) = (self.now[node], self.before[node]);
+            let velocity_before = self.velocities_before[node];
+            let carried = (4.0 * velocity - velocity_before) / 3.0;
+            self.goal.free[node] = (4.0 * now - before) / 3.0 + tau * (carried + tau * gravity);
+            self.next[node] = now + h * velocity;
+            self.velocities_before[node] = velocity;
+        }
+        let Some(start) = self.start(step) else {
+            self.restore(particles, step);
+            self.publish(particles);
+            return;
+        };
+        let end = self.newton.descend(
+            &mut self.next,
+            start,
+            &self.goal,
+            step.lame,
+            step.iterations,
+        );
+        self.elastic_j = Some(end.strain.energy_j);
+        self.residual_share = end.residual_n / self.goal.load_n.max(f64::MIN_POSITIVE);
+        for (node, &particle) in self.order.particle[..self.order.free].iter().enumerate() {
+            let (now, before) = (self.now[node], self.before[node]);
+            let velocity = (self.next[node] - (4.0 * now - before) / 3.0) / tau;
+            particles.velocities[particle as usize] = velocity.truncate().as_vec3();
+        }
+        std::mem::swap(&mut self.before, &mut self.now);
+        std::mem::swap(&mut self.now, &mut self.next);
+        if !self.is_wrecked(&end, &self.now, step) {
+            self.sound.copy_from_slice(&self.now);
+        }
+        self.publish(particles);
+    }
+
+    /// The energy at the guess `next`, which is put to `now` if that is better; `None` if the body
+    /// is wrecked.
+    fn start(&mut self, step: Step) -> Option<State> {
+        let gravity_m_s2 = f64::from(step.gravity_m_s2.length());
+        let (goal, newton) = (&mut self.goal, &mut self.newton);
+        let (mut load_n2, mut inertial_j) = (0.0, 0.0);
+        for (node, mass) in self.masses_kg.iter().enumerate() {
+            let away = self.now[node] - goal.free[node];
+            let force = goal.inertia[node] * away;
+            load_n2 += force.length_squared() + (mass * gravity_m_s2).powi(2);
+            inertial_j += 0.5 * force.dot(away);
+        }
+        goal.load_n = load_n2.sqrt();
+        let guess = newton.evaluate(&self.next, goal, step.lame);
+        let is_sound = !self.is_wrecked(&guess, &self.next, step);
+        let limit_j = self.elastic_j.map(|still_j| still_j + inertial_j);
+        if is_sound && limit_j.is_some_and(|limit_j| guess.energy_j <= limit_j) {
+            return Some(guess);
+        }
+        let still = self.newton.evaluate(&self.now, &self.goal, step.lame);
+        if self.is_wrecked(&still, &self.now, step) {
+            return None;
+        }
+        if is_sound && guess.energy_j <= still.energy_j {
+            return Some(self.newton.evaluate(&self.next, &self.goal, step.lame));
+        }
+        self.next.copy_from_slice(&self.now);
+        Some(still)
+    }
+
+    /// Whether the body is wrecked at displacements `at`, where the energy is `state`.
+    fn is_wrecked(&self, state: &State, at: &[DVec4], step: Step) -> bool {
+        let elements = self.newton.elements.elements();
+        self.wreck(step).is_wrecked(elements, &state.strain, at)
+    }
+
+    fn wreck(&self, step: Step) -> Wreck<'_> {
+        Wreck {
+            rest: &self.rest,
+            masses_kg: &self.masses_kg,
+            sound: &self.sound,
+            mu_pa: f64::from(step.lame.mu_pa),
+        }
+    }
+
+    /// Takes a step of a wrecked body towards its last sound shape. What is led there stands still.
+    fn restore(&mut self, particles: &mut Particles, step: Step) {
+        let wreck = Wreck {
+            rest: &self.rest,
+            masses_kg: &self.masses_kg,
+            sound: &self.sound,
+            mu_pa: f64::from(step.lame.mu_pa),
+        };
+        let led = wreck.restore(&mut self.newton, &mut self.now);
+        for (node, _) in led.iter().enumerate().filter(|(_, led)| **led) {
+            particles.velocities[self.order.particle[node] as usize] = Vec3::ZERO;
+        }
+        self.elastic_j = None;
+        self.forget();
+    }
+
+    /// Makes up a past of constant acceleration: the one that the forces give, or none where they
+    /// are those of no smooth motion.
+    fn make_up_past(&mut self, particles: &Particles, step: Step) {
+        let h = f64::from(step.substep_s);
+        let gravity = step.gravity_m_s2.as_dvec3().extend(0.0);
+        // Without inertia the residual is the elastic force.
+        self.goal.free.copy_from_slice(&self.now[..self.order.free]);
+        self.newton.evaluate(&self.now, &self.goal, step.lame);
+        let force = |node: usize, mass: f64| {
+            self.newton.residual[node].as_dvec4() + mass * gravity
+        };
+        let (mut force_n2, mut weight_n2) = (0.0, 0.0);
+        for (node, &mass) in self.masses_kg.iter().enumerate() {
+            force_n2 += force(node, mass).length_squared();
+            weight_n2 += (mass * gravity).length_squared();
+        }
+        let is_smooth = force_n2 <= SMOOTH_WEIGHTS.powi(2) * weight_n2;
+        for (node, &mass) in self.masses_kg.iter().enumerate() {
+            let particle = self.order.particle[node] as usize;
+            let velocity = particles.velocities[particle].as_dvec3().extend(0.0);
+            let acceleration = if is_smooth {
+                force(node, mass) / mass
+            } else {
+                DVec4::ZERO
+            };
+            self.before[node] = self.now[node] - h * (velocity - 0.5 * h * acceleration);
+            self.velocities_before[node] = velocity - h * acceleration;
+        }
+        self.past_substep_s = Some(step.substep_s);
+    }
+
+    /// Takes over particles that somebody else has moved; then there is no past.
+    fn take_over(&mut self, particles: &Particles) {
+        for (particle, published) in self.published.iter_mut().enumerate() {
+            let place = particles.places[particle];
+            if place.truncate() == published.truncate() {
+                continue;
+            }
+            *published = place;
+            let node = self.order.node[particle] as usize;
+            let moved = place.truncate().as_dvec3() - self.rest[node];
+            for displacements in [&mut self.now, &mut self.before, &mut self.next] {
+                displacements[node] = moved.extend(0.0);
+            }
+            self.elastic_j = None;
+            if node < self.order.free {
+                self.past_substep_s = None;
+            }
+        }
+    }
+
+    /// Puts the free particles where their nodes are.
+    fn publish(&mut self, particles: &mut Particles) {
+        for (node, &particle) in self.order.particle[..self.order.free].iter().enumerate() {
+            let particle = particle as usize;
+            let place = self.rest[node] + self.now[node].truncate();
+            let old = particles.places[particle];
+            let new = place.as_vec3().extend(old.w);
+            particles.previous[particle] = old;
+            particles.places[particle] = new;
+            self.published[particle] = new;
+        }
+    }
+}
