@@ -7,9 +7,9 @@
 //! Coulomb friction. Multiplier over h² is force.
 //!
 //! Two kinds of solver use it. One that alternates calls [`Contacts::solve`] after its own sweep. One
-//! that solves for all positions at once calls [`Contacts::look`] at its guess of them, reads
-//! [`Contacts::active`], and hands the multipliers that it found to [`Contacts::set_multipliers`];
-//! `Tools` offers the same for all tools together.
+//! that solves for all positions at once calls [`Contacts::resume`], then [`Contacts::look`] at its
+//! guess of them, reads [`Contacts::active`], and hands the multipliers that it found to
+//! [`Contacts::set_multipliers`]; `Tools` offers the same for all tools together.
 
 mod inside;
 mod near;
@@ -20,7 +20,10 @@ mod touch;
 pub use inside::{is_inside, way_out};
 pub use near::{Surface, SweptBox};
 
-use super::{ToolShape, handle::Handle};
+use super::{
+    ToolShape,
+    handle::{CARRIERS_MAX, Handle},
+};
 use glam::{Vec3, Vec4};
 use near::{Feature, Near, Vicinity};
 use nearest::{Axis, Nearest, blend, nearest};
@@ -65,7 +68,6 @@ pub struct Motion {
 
 /// A contact as it is seen by a solver that solves for all positions at once.
 #[derive(Clone, Copy, Debug)]
-#[allow(dead_code, reason = "for solvers that find all multipliers at once")]
 pub struct ActiveContact {
     /// Where on the body.
     pub handle: Handle,
@@ -78,6 +80,13 @@ pub struct ActiveContact {
     pub slip_m: Vec3,
     /// Coulomb friction coefficient.
     pub friction: f32,
+    /// What it was last known to push with, force on the body times h² [kg m].
+    pub multiplier: Vec3,
+    /// How the slope of the surface at the place follows each carrier of the handle [1/m]: where it
+    /// tilts, the place wanders by the tool's radius times the change.
+    pub slopes: [Vec3; CARRIERS_MAX],
+    /// Radius of the tool there [m].
+    pub radius_m: f32,
 }
 
 /// What one tool touches.
@@ -110,7 +119,6 @@ impl Contacts {
     }
 
     /// Number of active contacts.
-    #[allow(dead_code, reason = "for solvers that find all multipliers at once")]
     pub fn len(&self) -> usize {
         self.touches.len()
     }
@@ -260,8 +268,15 @@ impl Contacts {
         most_m
     }
 
+    /// Has what pressed in the last substep press as it did. `scale` is h² over that of the last
+    /// substep.
+    pub fn resume(&mut self, scale: f32) {
+        for touch in &mut self.touches {
+            touch.multiplier = scale * std::mem::take(&mut touch.guess);
+        }
+    }
+
     /// The contacts that the last look found.
-    #[allow(dead_code, reason = "for solvers that find all multipliers at once")]
     pub fn active<'a>(
         &'a self,
         tool: Motion,
@@ -273,6 +288,9 @@ impl Contacts {
             gap_m: touch.gap_m(tool, places),
             slip_m: touch.slip_m(tool, places),
             friction: tool.friction,
+            multiplier: touch.multiplier,
+            slopes: touch.slopes,
+            radius_m: touch.radius_m,
         })
     }
 
@@ -281,7 +299,6 @@ impl Contacts {
     /// # Panics
     ///
     /// If there is not one for each.
-    #[allow(dead_code, reason = "for solvers that find all multipliers at once")]
     pub fn set_multipliers(&mut self, multipliers: &[Vec3]) {
         assert_eq!(multipliers.len(), self.touches.len(), "one a contact");
         for (touch, &multiplier) in self.touches.iter_mut().zip(multipliers) {
@@ -354,6 +371,11 @@ impl Contacts {
                 normal: found.normal,
                 foot: found.foot,
                 start: blend(found.weights, start),
+                slopes: if is_point {
+                    [Vec3::ZERO; CARRIERS_MAX]
+                } else {
+                    carriers.slopes(end)
+                },
                 radius_m: near.radius_m + (found.start_gap_m + leave_m).min(0.0),
                 multiplier: Vec3::ZERO,
                 guess: Vec3::ZERO,

@@ -32,6 +32,18 @@ struct Hold {
     multiplier: Vec3,
 }
 
+/// A place held, as it is seen by a solver that solves for all positions at once.
+#[derive(Clone, Copy, Debug)]
+pub struct ActiveHold {
+    pub handle: Handle,
+    /// Where it is pulled to [m].
+    pub target_m: Vec3,
+    /// Of the pull [N/m].
+    pub stiffness_n_per_m: f32,
+    /// Largest pull [N].
+    pub force_max_n: f32,
+}
+
 /// The tissue that is grabbed, for limits that follow it.
 #[derive(Clone, Copy, Debug)]
 pub struct Tissue {
@@ -120,6 +132,28 @@ impl Grab {
                 - residual / (hold.handle.inverse_mass + alpha_tilde))
                 .clamp_length_max(self.force_max_n * h2);
             hold.handle.push(places, multiplier - hold.multiplier);
+            hold.multiplier = multiplier;
+        }
+    }
+
+    /// Number of places held.
+    pub fn len(&self) -> usize {
+        self.holds.len()
+    }
+
+    /// The places held by the tool at `position_m`.
+    pub fn active(&self, position_m: Vec3) -> impl Iterator<Item = ActiveHold> {
+        self.holds.iter().map(move |hold| ActiveHold {
+            handle: hold.handle,
+            target_m: position_m + hold.offset,
+            stiffness_n_per_m: 1.0 / self.compliance_m_per_n,
+            force_max_n: self.force_max_n,
+        })
+    }
+
+    /// Takes over the multiplier of each place held, force on the body times h² [kg m].
+    pub fn set_multipliers(&mut self, multipliers: &[Vec3]) {
+        for (hold, &multiplier) in self.holds.iter_mut().zip(multipliers) {
             hold.multiplier = multiplier;
         }
     }

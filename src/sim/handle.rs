@@ -4,7 +4,7 @@ use crate::geom::Embedding;
 use glam::{Vec3, Vec4};
 
 /// Carriers of a place in a triangle: three points of four particles each.
-const CARRIERS_MAX: usize = 12;
+pub const CARRIERS_MAX: usize = 12;
 /// No particle is moved by more than this many times what is asked of its place: beside held
 /// particles a place has little that can move, and a push through it would fling that away.
 const LEVER_MAX: f32 = 4.0;
@@ -130,6 +130,21 @@ impl TriangleCarriers {
             }
         }
         carriers
+    }
+
+    /// What the slope of the triangle, as it lies with its corners at `places` [m], changes by for
+    /// each metre that a carrier moves along its normal [1/m]; zeros for one without an area.
+    pub fn slopes(&self, places: [Vec3; 3]) -> [Vec3; CARRIERS_MAX] {
+        let [a, b, c] = places;
+        let normal = (b - a).cross(c - a);
+        // Gradient of the barycentric coordinate of the corner across from an edge.
+        let per_area = normal / normal.length_squared().max(f32::MIN_POSITIVE);
+        let corners = [c - b, a - c, b - a].map(|edge| per_area.cross(edge));
+        std::array::from_fn(|j| {
+            (0..3)
+                .map(|corner| self.corners[corner][j] * corners[corner])
+                .sum()
+        })
     }
 
     /// The handle at the place with barycentric `weights`.

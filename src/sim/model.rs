@@ -30,9 +30,7 @@ impl Model {
         match method {
             Method::MassSpring => Self::MassSpring(MassSpring::new(mesh, sound, fill)),
             Method::XpbdSprings => Self::Springs(Springs::new(mesh, sound, fill)),
-            Method::Implicit => {
-                Self::Implicit(Box::new(Implicit::new(mesh, sound, fill, places)))
-            }
+            Method::Implicit => Self::Implicit(Box::new(Implicit::new(mesh, sound, fill, places))),
             Method::XpbdNeoHookean => Self::NeoHookean(NeoHookean::new(mesh, sound, fill)),
         }
     }

@@ -389,8 +389,9 @@ impl Simulation {
                 lame: self.solver.lame(),
                 substep_s,
                 iterations: self.solver.iterations,
+                shares: (from, to),
             };
-            model.substep(&mut self.particles, step);
+            model.substep(&mut self.particles, &mut self.tools, step);
             return;
         }
         let accelerations =

@@ -3,7 +3,7 @@
 use super::{
     ToolAction, ToolInput, ToolShape,
     contact::{self, ActiveContact, Contacts, Motion, Surface, SweptBox},
-    grab::{Grab, Tissue},
+    grab::{ActiveHold, Grab, Tissue},
     particles::Particles,
 };
 use glam::Vec3;
@@ -140,14 +140,19 @@ impl Tools {
         }
     }
 
-    /// Lets tools that pressed in the last substep press on, before anything else answers.
-    pub fn press_on(&mut self, particles: &mut Particles, from: f32, to: f32, substep_s: f32) {
+    /// h² over that of the last substep, which this one is now.
+    fn scale(&mut self, substep_s: f32) -> f32 {
         let last_s = std::mem::replace(&mut self.last_substep_s, substep_s);
-        let scale = if last_s > 0.0 {
+        if last_s > 0.0 {
             (substep_s / last_s).powi(2)
         } else {
             1.0
-        };
+        }
+    }
+
+    /// Lets tools that pressed in the last substep press on, before anything else answers.
+    pub fn press_on(&mut self, particles: &mut Particles, from: f32, to: f32, substep_s: f32) {
+        let scale = self.scale(substep_s);
         for tool in &mut self.tools {
             let motion = tool.motion(from, to);
             (tool.contacts).press_on(motion, scale, &mut particles.places);
@@ -185,26 +190,44 @@ impl Tools {
         }
     }
 
-    /// Looks what touches each tool if the particles end the substep where they are now, and lists
-    /// it: contacts up to `margin_m` apart, with the index of their tool. For solvers that find all
-    /// multipliers at once.
-    #[allow(dead_code, reason = "for solvers that find all multipliers at once")]
+    /// Whether a tool holds the body or may touch it in this step.
+    pub fn are_busy(&self) -> bool {
+        (self.tools.iter()).any(|tool| tool.grab.is_some() || tool.contacts.is_near())
+    }
+
+    /// Has what pressed in the last substep press as it did: for solvers that find all multipliers
+    /// at once.
+    pub fn resume(&mut self, substep_s: f32) {
+        let scale = self.scale(substep_s);
+        for tool in &mut self.tools {
+            tool.contacts.resume(scale);
+        }
+    }
+
+    /// Looks what touches each tool if the particles end the substep, which lies between these
+    /// shares of the step, where they are now. For solvers that find all multipliers at once.
     pub fn look(
         &mut self,
         particles: &Particles,
         (from, to): (f32, f32),
         substep_s: f32,
-        margin_m: f32,
-    ) -> Vec<(usize, ActiveContact)> {
+    ) -> Vec<ActiveContact> {
         let mut found = Vec::new();
-        for (index, tool) in self.tools.iter_mut().enumerate() {
+        for tool in &mut self.tools {
             let motion = tool.motion(from, to);
-            tool.contacts
-                .look(motion, &particles.places, substep_s, margin_m);
-            let active = tool.contacts.active(motion, &particles.places);
-            found.extend(active.map(|contact| (index, contact)));
+            let places = &particles.places;
+            tool.contacts.look(motion, places, substep_s, 0.0);
+            found.extend(tool.contacts.active(motion, places));
         }
         found
+    }
+
+    /// Places that tools hold on to at this share of the step.
+    pub fn holds(&self, to: f32) -> impl Iterator<Item = ActiveHold> {
+        self.tools.iter().flat_map(move |tool| {
+            let grab = tool.grab.iter();
+            grab.flat_map(move |grab| grab.active(tool.at(to)))
+        })
     }
 
     /// Takes over the multipliers, force on the body times h² [kg m], of the contacts that the last
@@ -213,7 +236,6 @@ impl Tools {
     /// # Panics
     ///
     /// If there is not one for each.
-    #[allow(dead_code, reason = "for solvers that find all multipliers at once")]
     pub fn set_multipliers(&mut self, mut multipliers: &[Vec3]) {
         for tool in &mut self.tools {
             let (own, rest) = multipliers.split_at(tool.contacts.len());
@@ -221,6 +243,20 @@ impl Tools {
             multipliers = rest;
         }
         assert!(multipliers.is_empty(), "one multiplier a contact");
+    }
+
+    /// Takes over the multipliers, force on the body times h² [kg m], of the places held.
+    ///
+    /// # Panics
+    ///
+    /// If there is not one for each.
+    pub fn set_hold_multipliers(&mut self, mut multipliers: &[Vec3]) {
+        for grab in self.tools.iter_mut().filter_map(|tool| tool.grab.as_mut()) {
+            let (own, rest) = multipliers.split_at(grab.len());
+            grab.set_multipliers(own);
+            multipliers = rest;
+        }
+        assert!(multipliers.is_empty(), "one multiplier a place held");
     }
 
     /// Adds up the forces of a substep.

@@ -1,6 +1,7 @@
 //! A place of the surface that touches a tool in a substep.
 
 use super::{Handle, Motion, near::Feature};
+use crate::sim::handle::CARRIERS_MAX;
 use glam::{Vec3, Vec4};
 
 /// One inequality: the place stays outside the tangent plane of the tool, and friction holds it
@@ -19,6 +20,8 @@ pub struct Touch {
     pub start: Vec3,
     /// How near the place may come to the tangent plane of the axis [m].
     pub radius_m: f32,
+    /// How the slope of its triangle follows the carriers; zeros for a point of the surface [1/m].
+    pub slopes: [Vec3; CARRIERS_MAX],
     /// What has been pushed so far [kg m]: never towards the tool, and along the tangent plane no
     /// more than friction allows.
     pub multiplier: Vec3,
@@ -28,7 +31,6 @@ pub struct Touch {
 
 impl Touch {
     /// How far the place is outside the tool, less what is asked for [m].
-    #[allow(dead_code, reason = "for solvers that find all multipliers at once")]
     pub fn gap_m(&self, tool: Motion, places: &[Vec4]) -> f32 {
         self.gap_at(self.handle.place(places) - tool.to_m)
     }
@@ -39,7 +41,6 @@ impl Touch {
     }
 
     /// How far the place has slid along the tool in this substep [m].
-    #[allow(dead_code, reason = "for solvers that find all multipliers at once")]
     pub fn slip_m(&self, tool: Motion, places: &[Vec4]) -> Vec3 {
         let slip = self.handle.place(places) - tool.to_m - self.start;
         slip - self.normal.dot(slip) * self.normal

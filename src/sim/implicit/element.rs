@@ -361,8 +361,7 @@ impl<W: Wide> Deformation<W> {
         let off = xy * xy + yz * yz + zx * zx;
         let p_squared = (a * a + b * b + c * c + off + off) * W::splat(1.0 / 6.0);
         let p = p_squared.sqrt();
-        let determinant =
-            a * (b * c - yz * yz) - xy * (xy * c - yz * zx) + zx * (xy * yz - b * zx);
+        let determinant = a * (b * c - yz * yz) - xy * (xy * c - yz * zx) + zx * (xy * yz - b * zx);
         let cube = (p * p_squared).max(W::splat(1e-30));
         let q = W::splat(0.5) * determinant / cube;
         let q = q.min(W::splat(1.0)).max(W::splat(-1.0));
@@ -478,7 +477,12 @@ unsafe fn add_stiffness_of<W: Wide>(
         );
         let (g0, c0) = (-(g1 + g2 + g3), -(c1 + c2 + c3));
         let none = Vector::splat(0.0);
-        let (b0, b1, b2, b3) = (c0.times(bulk), c1.times(bulk), c2.times(bulk), c3.times(bulk));
+        let (b0, b1, b2, b3) = (
+            c0.times(bulk),
+            c1.times(bulk),
+            c2.times(bulk),
+            c3.times(bulk),
+        );
         let at = &batch.offsets;
         // SAFETY: as the caller's.
         unsafe {

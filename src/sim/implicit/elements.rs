@@ -95,8 +95,7 @@ impl Elements {
     /// If `matrix` is not the one the elements were made for, or a displacement is missing.
     pub fn add_stiffness(&self, displacements: &[DVec4], lame: Lame, matrix: &mut BlockMatrix) {
         assert!(
-            displacements.len() == self.node_count + 1
-                && matrix.block_count() == self.block_count,
+            displacements.len() == self.node_count + 1 && matrix.block_count() == self.block_count,
             "one displacement a node, and the matrix the elements were made for"
         );
         let (moduli, blocks) = (Moduli::from(lame), matrix.blocks_mut().as_mut_ptr());

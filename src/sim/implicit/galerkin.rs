@@ -4,7 +4,6 @@ use super::{
     lattice::Interpolation,
     matrix::{Block, BlockMatrix, ZERO},
 };
-use glam::Vec4;
 
 /// Lattice points that the neighbours of one node may hang on.
 const POINTS_MAX: usize = 256;
@@ -93,12 +92,7 @@ impl Galerkin {
     ///
     /// If they are not.
     #[inline(always)]
-    pub fn project(
-        &self,
-        matrix: &BlockMatrix,
-        weights: &Interpolation,
-        coarse: &mut BlockMatrix,
-    ) {
+    pub fn project(&self, matrix: &BlockMatrix, weights: &Interpolation, coarse: &mut BlockMatrix) {
         coarse.clear();
         let targets = coarse.blocks_mut();
         let mut sums = [ZERO; POINTS_MAX];

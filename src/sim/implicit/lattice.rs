@@ -80,7 +80,11 @@ impl Interpolation {
                 let mut key = [0_u32; 3];
                 for (slot, axis) in axes.into_iter().enumerate() {
                     let upper = corner >> axis & 1;
-                    weight *= if upper == 1 { share[axis] } else { 1.0 - share[axis] };
+                    weight *= if upper == 1 {
+                        share[axis]
+                    } else {
+                        1.0 - share[axis]
+                    };
                     key[slot] = first[axis] as u32 + upper;
                 }
                 (weight >= WEIGHT_MIN).then_some((key, weight))

@@ -18,6 +18,8 @@ mod cg;
 mod element;
 mod elements;
 mod galerkin;
+mod grip;
+mod hold;
 mod lattice;
 mod matrix;
 mod multigrid;
@@ -28,20 +30,25 @@ mod strips;
 mod sweep;
 mod wide;
 
-use super::{Lame, particles::Particles};
+use super::{Lame, particles::Particles, tools::Tools};
 use crate::geom::TetMesh;
 use element::{Element, PAIRS};
 use elements::Elements;
 use glam::{DVec3, DVec4, Vec3, Vec4};
+use grip::Span;
 use matrix::BlockMatrix;
 use multigrid::Multigrid;
+pub use newton::Work;
 use newton::{Goal, Newton, State};
 use order::Order;
 use restore::Wreck;
-pub use newton::Work;
 
 /// The implicit share of a substep, τ/h.
 const IMPLICIT_SHARE: f64 = 2.0 / 3.0;
+/// Rounds of Newton's method a substep in which tools act, at most.
+const ROUNDS_MAX: usize = 4;
+/// Rounds that begin with a look at what the tools do.
+const LOOKS: usize = 2;
 /// Forces beyond so many times the weight come from no motion that a past could be made up for.
 const SMOOTH_WEIGHTS: f64 = 2.0;
 
@@ -52,8 +59,10 @@ pub struct Step {
     pub lame: Lame,
     /// Length [s].
     pub substep_s: f32,
-    /// Newton steps a stage, at most.
+    /// Newton steps, at most; with tools, a round.
     pub iterations: u32,
+    /// Shares of the time step at which it starts and ends.
+    pub shares: (f32, f32),
 }
 
 /// A body whose substeps are solved as a whole.
@@ -161,42 +170,52 @@ impl Implicit {
         self.newton.begin_step();
     }
 
-    /// Advances the particles by a substep.
-    pub fn substep(&mut self, particles: &mut Particles, step: Step) {
+    /// Advances the particles by a substep, under `tools`.
+    pub fn substep(&mut self, particles: &mut Particles, tools: &mut Tools, step: Step) {
         self.take_over(particles);
+        particles.previous.copy_from_slice(&particles.places);
         let h = f64::from(step.substep_s);
         let tau = IMPLICIT_SHARE * h;
         let gravity = step.gravity_m_s2.as_dvec3().extend(0.0);
         let inertia = self.masses_kg.iter().map(|&mass| mass / (tau * tau));
         self.goal.inertia.clear();
         self.goal.inertia.extend(inertia);
+        self.goal.grip.clear();
         if self.past_substep_s != Some(step.substep_s) {
             self.make_up_past(particles, step);
         }
         for (node, &particle) in self.order.particle[..self.order.free].iter().enumerate() {
-            let velocity = particles.velocities[particle as usize].as_dvec3().extend(0.0);
+            let velocity = particles.velocities[particle as usize]
+                .as_dvec3()
+                .extend(0.0);
             let (now, before) = (self.now[node], self.before[node]);
-            let velocity_before = self.velocities_before[node];
+            let velocity_before = std::mem::replace(&mut self.velocities_before[node], velocity);
+            if !velocity.is_finite() {
+                // Held for this substep; whoever made it so will be told.
+                (self.goal.free[node], self.next[node]) = (now, now);
+                continue;
+            }
             let carried = (4.0 * velocity - velocity_before) / 3.0;
             self.goal.free[node] = (4.0 * now - before) / 3.0 + tau * (carried + tau * gravity);
             self.next[node] = now + h * velocity;
-            self.velocities_before[node] = velocity;
         }
-        let Some(start) = self.start(step) else {
+        let end = if tools.are_busy() {
+            self.solve_with(tools, particles, step)
+        } else {
+            let start = self.start(step);
+            start.map(|start| self.descend(start, step))
+        };
+        let Some(end) = end else {
             self.restore(particles, step);
             self.publish(particles);
             return;
         };
-        let end = self.newton.descend(
-            &mut self.next,
-            start,
-            &self.goal,
-            step.lame,
-            step.iterations,
-        );
         self.elastic_j = Some(end.strain.energy_j);
         self.residual_share = end.residual_n / self.goal.load_n.max(f64::MIN_POSITIVE);
         for (node, &particle) in self.order.particle[..self.order.free].iter().enumerate() {
+            if !self.velocities_before[node].is_finite() {
+                continue;
+            }
             let (now, before) = (self.now[node], self.before[node]);
             let velocity = (self.next[node] - (4.0 * now - before) / 3.0) / tau;
             particles.velocities[particle as usize] = velocity.truncate().as_vec3();
@@ -207,6 +226,64 @@ impl Implicit {
             self.sound.copy_from_slice(&self.now);
         }
         self.publish(particles);
+    }
+
+    /// Newton's method from `next`, where the energy is `start`.
+    fn descend(&mut self, start: State, step: Step) -> State {
+        let (newton, goal) = (&mut self.newton, &self.goal);
+        newton.descend(&mut self.next, start, goal, step.lame, step.iterations)
+    }
+
+    /// Newton's method in rounds, with what the tools do looked at anew in each; `None` if the body
+    /// is wrecked.
+    fn solve_with(
+        &mut self,
+        tools: &mut Tools,
+        particles: &mut Particles,
+        step: Step,
+    ) -> Option<State> {
+        let span = Span {
+            shares: step.shares,
+            substep_s: step.substep_s,
+        };
+        tools.begin_substep(particles, step.shares.0);
+        tools.resume(step.substep_s);
+        self.newton.begin_step();
+        let mut state = None;
+        for round in 0..ROUNDS_MAX {
+            if round < LOOKS {
+                self.show(particles);
+                self.goal.grip.look(
+                    tools,
+                    particles,
+                    span,
+                    &self.order,
+                    (self.newton).body_stiffness(&self.now, &self.goal, step.lame),
+                    &self.next,
+                );
+            }
+            let start = if round == 0 {
+                self.start(step)?
+            } else {
+                self.newton.evaluate(&self.next, &self.goal, step.lame)
+            };
+            state = Some(self.descend(start, step));
+            let settled = self.goal.grip.settle(tools, span, &self.next);
+            if settled && round + 1 >= LOOKS {
+                break;
+            }
+        }
+        tools.end_substep(step.substep_s);
+        state
+    }
+
+    /// Puts particles to where they are at `next`, for the tools to see.
+    fn show(&self, particles: &mut Particles) {
+        for (node, &particle) in self.order.particle[..self.order.free].iter().enumerate() {
+            let place = self.rest[node] + self.next[node].truncate();
+            let shown = &mut particles.places[particle as usize];
+            *shown = place.as_vec3().extend(shown.w);
+        }
     }
 
     /// The energy at the guess `next`, which is put to `now` if that is better; `None` if the body
@@ -225,7 +302,8 @@ impl Implicit {
         let guess = newton.evaluate(&self.next, goal, step.lame);
         let is_sound = !self.is_wrecked(&guess, &self.next, step);
         let limit_j = self.elastic_j.map(|still_j| still_j + inertial_j);
-        if is_sound && limit_j.is_some_and(|limit_j| guess.energy_j <= limit_j) {
+        let is_alone = self.goal.grip.holds().is_empty();
+        if is_alone && is_sound && limit_j.is_some_and(|limit_j| guess.energy_j <= limit_j) {
             return Some(guess);
         }
         let still = self.newton.evaluate(&self.now, &self.goal, step.lame);
@@ -278,9 +356,7 @@ impl Implicit {
         // Without inertia the residual is the elastic force.
         self.goal.free.copy_from_slice(&self.now[..self.order.free]);
         self.newton.evaluate(&self.now, &self.goal, step.lame);
-        let force = |node: usize, mass: f64| {
-            self.newton.residual[node].as_dvec4() + mass * gravity
-        };
+        let force = |node: usize, mass: f64| self.newton.residual[node].as_dvec4() + mass * gravity;
         let (mut force_n2, mut weight_n2) = (0.0, 0.0);
         for (node, &mass) in self.masses_kg.iter().enumerate() {
             force_n2 += force(node, mass).length_squared();
@@ -328,7 +404,6 @@ impl Implicit {
             let place = self.rest[node] + self.now[node].truncate();
             let old = particles.places[particle];
             let new = place.as_vec3().extend(old.w);
-            particles.previous[particle] = old;
             particles.places[particle] = new;
             self.published[particle] = new;
         }

@@ -13,6 +13,7 @@ use super::{
     cg::{ConjugateGradients, Stop, dot},
     element::Strain,
     elements::Elements,
+    grip::Grip,
     matrix::BlockMatrix,
     multigrid::Multigrid,
 };
@@ -45,6 +46,8 @@ pub struct Goal {
     pub inertia: Vec<f64>,
     /// Norm of the forces that move the body, gravity and inertia [N].
     pub load_n: f64,
+    /// What holds the body from outside.
+    pub grip: Grip,
 }
 
 /// The energy and what comes with it at one state.
@@ -78,6 +81,9 @@ pub struct Newton {
     pub residual: Vec<Vec4>,
     trial: Vec<DVec4>,
     pub work: Work,
+    /// How each free node resists by itself, without what holds it from outside; nothing before the
+    /// first step [N/m].
+    body_stiffness: Vec<f32>,
     /// Whether the lattices are of a matrix of this time step.
     lattices_are_fresh: bool,
 }
@@ -100,6 +106,7 @@ impl Newton {
             residual: vec![Vec4::ZERO; free],
             trial: vec![DVec4::ZERO; node_count + 1],
             work: Work::default(),
+            body_stiffness: Vec::new(),
             lattices_are_fresh: false,
         }
     }
@@ -115,8 +122,12 @@ impl Newton {
             inertial_j += 0.5 * force.dot(away);
             *residual = self.forces[node] - force.as_vec4();
         }
+        let mut held_j = 0.0;
+        for hold in goal.grip.holds() {
+            held_j += hold.add_forces(at, &mut self.residual);
+        }
         State {
-            energy_j: strain.energy_j + inertial_j,
+            energy_j: strain.energy_j + inertial_j + held_j,
             residual_n: dot(&self.residual, &self.residual).sqrt(),
             strain,
         }
@@ -181,23 +192,35 @@ impl Newton {
         self.lattices_are_fresh = false;
     }
 
+    /// How each free node resists by itself, in this state or an earlier one [N/m].
+    pub fn body_stiffness(&mut self, at: &[DVec4], goal: &Goal, lame: Lame) -> &[f32] {
+        if self.body_stiffness.is_empty() {
+            self.assemble(at, goal, lame);
+        }
+        &self.body_stiffness
+    }
+
     /// Sets the matrix to the second derivative of the energy at `at`, made positive.
     fn assemble(&mut self, at: &[DVec4], goal: &Goal, lame: Lame) {
+        self.body_stiffness.resize(self.matrix.len(), 0.0);
         self.matrix.clear();
         self.elements.add_stiffness(at, lame, &mut self.matrix);
         for (node, &inertia) in goal.inertia.iter().enumerate() {
             self.matrix.add_to_diagonal(node, inertia as f32);
+        }
+        for (node, stiffness) in self.body_stiffness.iter_mut().enumerate() {
+            let block = &self.matrix.blocks()[self.matrix.diagonal(node)];
+            *stiffness = (block[0].x + block[1].y + block[2].z) / 3.0;
+        }
+        for hold in goal.grip.holds() {
+            hold.add_stiffness(at, &mut self.matrix);
         }
         self.matrix.mirror_upper();
     }
 
     /// Whether stiffness so outweighs inertia that the sweeps need the lattices' help.
     fn is_stiff(&self, goal: &Goal) -> bool {
-        let diagonal = |node: usize| {
-            let block = &self.matrix.blocks()[self.matrix.diagonal(node)];
-            f64::from(block[0].x + block[1].y + block[2].z) / 3.0
-        };
-        let stiffness: f64 = (0..self.matrix.len()).map(diagonal).sum();
+        let stiffness: f64 = self.body_stiffness.iter().map(|&x| f64::from(x)).sum();
         stiffness > SWEEPS_SUFFICE * goal.inertia.iter().sum::<f64>()
     }
 

@@ -66,7 +66,10 @@ fn interleave(particles: &mut [u32]) {
     let length = particles.len().div_ceil(STREAMS);
     let sorted = particles.to_vec();
     let turns = (0..length).flat_map(|i| (0..STREAMS).map(move |stream| stream * length + i));
-    for (particle, from) in particles.iter_mut().zip(turns.filter(|&i| i < sorted.len())) {
+    for (particle, from) in particles
+        .iter_mut()
+        .zip(turns.filter(|&i| i < sorted.len()))
+    {
         *particle = sorted[from];
     }
 }

@@ -18,7 +18,9 @@ pub fn strips(tets: &[[u32; 4]], node_count: usize) -> Vec<Vec<u32>> {
     }
     let mut strips: Vec<Vec<u32>> = vec![Vec::new()];
     for tets in counted {
-        let full = strips.last().is_some_and(|strip| strip.len() + tets.len() / 2 > STRIP_TETS);
+        let full = strips
+            .last()
+            .is_some_and(|strip| strip.len() + tets.len() / 2 > STRIP_TETS);
         if full {
             strips.push(Vec::new());
         }

@@ -207,13 +207,17 @@ impl Wide for Plain {
     #[inline(always)]
     fn min(self, other: Self) -> Self {
         let pick = |a: f32, b: f32| if a < b { a } else { b };
-        Self(std::array::from_fn(|lane| pick(self.0[lane], other.0[lane])))
+        Self(std::array::from_fn(|lane| {
+            pick(self.0[lane], other.0[lane])
+        }))
     }
 
     #[inline(always)]
     fn max(self, other: Self) -> Self {
         let pick = |a: f32, b: f32| if a > b { a } else { b };
-        Self(std::array::from_fn(|lane| pick(self.0[lane], other.0[lane])))
+        Self(std::array::from_fn(|lane| {
+            pick(self.0[lane], other.0[lane])
+        }))
     }
 
     #[inline(always)]

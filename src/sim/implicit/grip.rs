@@ -1,0 +1,151 @@
+//! From the tools of a body to what holds its places, and back to the forces on the tools.
+
+use super::{
+    hold::{Barrier, Hold, Place, Pull, outer},
+    order::Order,
+};
+use crate::sim::{contact::ActiveContact, handle::Handle, particles::Particles, tools::Tools};
+use glam::{DMat3, DVec3, DVec4, Vec3};
+
+/// Stiffness of a barrier over that of the body where it pushes.
+const OVER_BODY: f64 = 10.0;
+/// Stiffness of friction, until it slips, over that of the body.
+fn friction_over_body() -> f64 {
+    std::env::var("FOB")
+        .ok()
+        .and_then(|v| v.parse().ok())
+        .unwrap_or(1.0)
+}
+/// Change of a force over the largest at which another round is worth it.
+const SETTLED_SHARE: f64 = 0.02;
+
+/// The substep, as the tools see it.
+#[derive(Clone, Copy, Debug)]
+pub struct Span {
+    /// Shares of the time step at which the substep starts and ends.
+    pub shares: (f32, f32),
+    /// Length of the substep [s].
+    pub substep_s: f32,
+}
+
+/// All that holds a body in a substep.
+#[derive(Clone, Debug, Default)]
+pub struct Grip {
+    holds: Vec<Hold>,
+    /// How many of them, from the first on, are of tools in the way; the others are places held.
+    touches: usize,
+}
+
+impl Grip {
+    /// Lets go of everything.
+    pub fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    pub fn holds(&self) -> &[Hold] {
+        &self.holds
+    }
+
+    /// Looks what the tools do to the body if it ends the substep at `displacements`, which is also
+    /// where `particles` are.
+    pub fn look(
+        &mut self,
+        tools: &mut Tools,
+        particles: &Particles,
+        span: Span,
+        order: &Order,
+        body_stiffness: &[f32],
+        displacements: &[DVec4],
+    ) {
+        self.holds.clear();
+        let per_h2 = 1.0 / f64::from(span.substep_s).powi(2);
+        for touch in tools.look(particles, span.shares, span.substep_s) {
+            let place = Place::new(&touch.handle, order);
+            let stiffness = place.stiffness(body_stiffness);
+            let s = place.displacement(displacements);
+            self.holds
+                .push(in_the_way(place, &touch, s, stiffness, per_h2));
+        }
+        self.touches = self.holds.len();
+        for hold in tools.holds(span.shares.1) {
+            let place = Place::new(&hold.handle, order);
+            let s = place.displacement(displacements);
+            let stretch_m = hold.handle.place(&particles.places) - hold.target_m;
+            self.holds.push(Hold {
+                barrier: None,
+                pull: Some(Pull {
+                    across: DMat3::IDENTITY,
+                    anchor_m: s - stretch_m.as_dvec3(),
+                    force_n: DVec3::ZERO,
+                    stiffness: f64::from(hold.stiffness_n_per_m),
+                    force_max_n: f64::from(hold.force_max_n),
+                }),
+                friction: 0.0,
+                place,
+            });
+        }
+    }
+
+    /// Gives the forces at `displacements` to the tools, and takes them for the multipliers of the
+    /// next round. Whether they have settled.
+    pub fn settle(&mut self, tools: &mut Tools, span: Span, displacements: &[DVec4]) -> bool {
+        let h2 = f64::from(span.substep_s).powi(2);
+        let forces_n: Vec<DVec3> = self
+            .holds
+            .iter()
+            .map(|h| h.force_n(displacements))
+            .collect();
+        let multipliers: Vec<Vec3> = forces_n.iter().map(|&f| (h2 * f).as_vec3()).collect();
+        let (pushes, pulls) = multipliers.split_at(self.touches);
+        tools.set_multipliers(pushes);
+        tools.set_hold_multipliers(pulls);
+        let largest_n = forces_n.iter().map(|f| f.length()).fold(0.0, f64::max);
+        let mut change_n = 0.0_f64;
+        for hold in &mut self.holds[..self.touches] {
+            change_n = change_n.max(hold.update_multipliers(displacements));
+        }
+        change_n <= SETTLED_SHARE * largest_n
+    }
+}
+
+/// A tool in the way of a place at displacement `s`, with friction; `stiffness` is the body's there.
+fn in_the_way(place: Place, touch: &ActiveContact, s: DVec3, stiffness: f64, per_h2: f64) -> Hold {
+    let normal = touch.normal.as_dvec3();
+    let force_n = per_h2 * touch.multiplier.as_dvec3();
+    let pushed = force_n.dot(normal).max(0.0);
+    let across = DMat3::IDENTITY - outer(normal, normal);
+    let friction = f64::from(touch.friction);
+    let carriers = place.carriers.len();
+    Hold {
+        barrier: Some(Barrier {
+            normal,
+            gap_m: f64::from(touch.gap_m) - normal.dot(s),
+            force_n: pushed,
+            stiffness: OVER_BODY * stiffness,
+            slopes: touch.slopes[..carriers]
+                .iter()
+                .map(|slope| f64::from(touch.radius_m.max(0.0)).sqrt() * slope.as_dvec3())
+                .collect(),
+        }),
+        pull: (friction > 0.0).then(|| Pull {
+            across,
+            anchor_m: s - touch.slip_m.as_dvec3(),
+            force_n: across * force_n,
+            stiffness: friction_over_body() * stiffness,
+            force_max_n: friction * pushed,
+        }),
+        friction,
+        place,
+    }
+}
+
+impl Place {
+    fn new(handle: &Handle, order: &Order) -> Self {
+        let carriers = handle.carriers();
+        Self {
+            carriers: carriers
+                .map(|(particle, weight)| (order.node[particle as usize], f64::from(weight)))
+                .collect(),
+        }
+    }
+}
