@@ -78,6 +78,10 @@ const HELD_TO: &[HeldTo] = &[
         method: Method::XpbdSprings,
         ..SPRINGS
     },
+    HeldTo {
+        method: Method::Implicit,
+        ..FAITHFUL
+    },
     FAITHFUL,
 ];
 
@@ -280,5 +284,7 @@ mod patch;
 mod rest;
 #[path = "validation/silicone.rs"]
 mod silicone;
+#[path = "validation/stiff.rs"]
+mod stiff;
 #[path = "validation/stretch.rs"]
 mod stretch;

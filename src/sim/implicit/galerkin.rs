@@ -136,7 +136,7 @@ fn add_times(target: &mut Block, block: &Block, factor: f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{DVec3, Vec3};
+    use glam::{DVec3, Vec3, Vec4};
 
     /// A block of nodes tied to their neighbours by springs of various stiffness.
     fn nodes() -> (BlockMatrix, Vec<DVec3>) {

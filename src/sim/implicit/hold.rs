@@ -244,3 +244,6 @@ fn add(matrix: &mut BlockMatrix, place: usize, stiffness: DMat3) {
 pub fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(b.x * a, b.y * a, b.z * a)
 }
+
+#[cfg(test)]
+mod tests;

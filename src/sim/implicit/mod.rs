@@ -38,17 +38,18 @@ use glam::{DVec3, DVec4, Vec3, Vec4};
 use grip::Span;
 use matrix::BlockMatrix;
 use multigrid::Multigrid;
-pub use newton::Work;
 use newton::{Goal, Newton, State};
 use order::Order;
 use restore::Wreck;
 
 /// The implicit share of a substep, τ/h.
 const IMPLICIT_SHARE: f64 = 2.0 / 3.0;
-/// Rounds of Newton's method a substep in which tools act, at most.
-const ROUNDS_MAX: usize = 4;
-/// Rounds that begin with a look at what the tools do.
-const LOOKS: usize = 2;
+/// Rounds of one Newton step a substep in which tools act, at most: so many, and as many for each
+/// iteration. A body that a tool leaves in one long substep needs the most.
+const ROUNDS: u32 = 4;
+/// Rounds that begin with a look at what the tools do, for each iteration. More than one Newton step
+/// between two looks would go to where the tools' tangents no longer hold, and fro.
+const LOOKS: u32 = 2;
 /// Forces beyond so many times the weight come from no motion that a past could be made up for.
 const SMOOTH_WEIGHTS: f64 = 2.0;
 
@@ -59,7 +60,7 @@ pub struct Step {
     pub lame: Lame,
     /// Length [s].
     pub substep_s: f32,
-    /// Newton steps, at most; with tools, a round.
+    /// Newton steps, at most; where tools act, a measure of them.
     pub iterations: u32,
     /// Shares of the time step at which it starts and ends.
     pub shares: (f32, f32),
@@ -145,11 +146,6 @@ impl Implicit {
     /// What is left of the forces after the last substep, over the forces that move the body.
     pub fn residual_share(&self) -> f32 {
         self.residual_share as f32
-    }
-
-    /// What was done since the last call.
-    pub fn take_work(&mut self) -> Work {
-        std::mem::take(&mut self.newton.work)
     }
 
     /// Forgets the past: the body was put where it is.
@@ -250,8 +246,13 @@ impl Implicit {
         tools.resume(step.substep_s);
         self.newton.begin_step();
         let mut state = None;
-        for round in 0..ROUNDS_MAX {
-            if round < LOOKS {
+        let looks = LOOKS * step.iterations;
+        let once = Step {
+            iterations: 1,
+            ..step
+        };
+        for round in 0..ROUNDS + ROUNDS * step.iterations {
+            if round < looks {
                 self.show(particles);
                 self.goal.grip.look(
                     tools,
@@ -267,9 +268,9 @@ impl Implicit {
             } else {
                 self.newton.evaluate(&self.next, &self.goal, step.lame)
             };
-            state = Some(self.descend(start, step));
+            state = Some(self.descend(start, once));
             let settled = self.goal.grip.settle(tools, span, &self.next);
-            if settled && round + 1 >= LOOKS {
+            if settled && round + 1 >= looks {
                 break;
             }
         }

@@ -59,15 +59,6 @@ pub struct State {
     pub strain: Strain,
 }
 
-/// What Newton's method did.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Work {
-    pub newton: usize,
-    pub cg: usize,
-    pub cuts: usize,
-    pub evaluations: usize,
-}
-
 /// The matrix of a body and all that solves with it.
 #[derive(Clone, Debug)]
 pub struct Newton {
@@ -80,7 +71,6 @@ pub struct Newton {
     /// Minus the gradient of the energy at each free node [N].
     pub residual: Vec<Vec4>,
     trial: Vec<DVec4>,
-    pub work: Work,
     /// How each free node resists by itself, without what holds it from outside; nothing before the
     /// first step [N/m].
     body_stiffness: Vec<f32>,
@@ -105,7 +95,6 @@ impl Newton {
             forces: vec![Vec4::ZERO; node_count + 1],
             residual: vec![Vec4::ZERO; free],
             trial: vec![DVec4::ZERO; node_count + 1],
-            work: Work::default(),
             body_stiffness: Vec::new(),
             lattices_are_fresh: false,
         }
@@ -113,7 +102,6 @@ impl Newton {
 
     /// The energy at `at`; its residual goes to `self.residual`.
     pub fn evaluate(&mut self, at: &[DVec4], goal: &Goal, lame: Lame) -> State {
-        self.work.evaluations += 1;
         let strain = self.elements.forces(at, lame, &mut self.forces);
         let mut inertial_j = 0.0;
         for (node, residual) in self.residual.iter_mut().enumerate() {
@@ -148,7 +136,6 @@ impl Newton {
             if state.residual_n <= rest_n {
                 break;
             }
-            self.work.newton += 1;
             self.assemble(at, goal, lame);
             let stop = Stop {
                 error: FORCING,
@@ -171,7 +158,7 @@ impl Newton {
         if lattices && !std::mem::replace(&mut self.lattices_are_fresh, true) {
             self.multigrid.refresh_lattices(&self.matrix);
         }
-        self.work.cg += self.cg.solve(
+        self.cg.solve(
             &self.matrix,
             &mut self.multigrid,
             lattices,
@@ -255,7 +242,6 @@ impl Newton {
                 found = Some(next);
                 break;
             }
-            self.work.cuts += 1;
             // The lowest point of the parabola through both energies and the slope.
             let lowest = -slope * share * share / (2.0 * (change_j - slope * share));
             share = if lowest.is_finite() {
@@ -276,3 +262,6 @@ impl Newton {
 fn rest_n(state: &State, goal: &Goal) -> f64 {
     (REST_SHARE * goal.load_n).max(ROUNDING_SHARE * state.strain.force_squared_n2.sqrt())
 }
+
+#[cfg(test)]
+mod tests;

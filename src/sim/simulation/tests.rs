@@ -3,6 +3,7 @@
 mod contact;
 mod grab;
 mod hertz;
+mod implicit;
 mod pokes;
 mod sleep;
 
@@ -504,7 +505,11 @@ fn flat_and_inverted_rest_tetrahedra_are_left_out_and_harmless() {
 
 #[test]
 fn crushed_body_recovers_its_shape() {
-    for method in [Method::XpbdSprings, Method::XpbdNeoHookean] {
+    for method in [
+        Method::XpbdSprings,
+        Method::Implicit,
+        Method::XpbdNeoHookean,
+    ] {
         let mut setup = slab();
         setup.damping_per_s = 10.0;
         let mut simulation = Simulation::new(setup, soft(method));
@@ -526,7 +531,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
     #[test]
     fn bits_do_not_depend_on_the_number_of_threads(
-        x in 0.05_f32..0.2, z in 0.05_f32..0.2, slide in -0.01_f32..0.01, method in 0_usize..3,
+        x in 0.05_f32..0.2, z in 0.05_f32..0.2, slide in -0.01_f32..0.01, method in 0..Method::ALL.len(),
     ) {
         // Large enough that colours are shared out: see `lanes::BATCHES_PER_TASK`.
         let run = |threads: usize| {

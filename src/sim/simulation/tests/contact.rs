@@ -168,12 +168,12 @@ fn ball_that_appears_inside_is_let_out_gently_on_the_nearest_side() {
 /// A block lies on a ball so large that it is nearly flat, and then gravity is tilted. Friction over
 /// pressure in the next steps, once the block has given way to its own shear, and how fast it goes
 /// after `SLOPE_STEPS` [m/s].
-fn on_a_slope(friction: f32, slope: f32) -> (f32, f32) {
+pub(super) fn on_a_slope(params: SolverParams, friction: f32, slope: f32) -> (f32, f32) {
     let mut setup = body(Vec3::new(0.06, 0.02, 0.06), 0.01, |_| false);
     let mass_kg: f32 = setup.masses_kg.iter().sum();
     setup.gravity_m_s2 = DOWN;
     setup.damping_per_s = 20.0;
-    let mut simulation = Simulation::new(setup, soft(Method::XpbdNeoHookean));
+    let mut simulation = Simulation::new(setup, params);
     let radius_m = 1.0;
     let table = ToolInput {
         friction,
@@ -203,8 +203,8 @@ const SLOPE_STEPS: u32 = 10;
 
 #[test]
 fn block_on_a_slope_sticks_below_its_friction_angle_and_slides_above_by_coulombs_law() {
-    let friction = 0.4;
-    let (ratio, speed_m_s) = on_a_slope(friction, 0.35);
+    let (friction, params) = (0.4, soft(Method::XpbdNeoHookean));
+    let (ratio, speed_m_s) = on_a_slope(params, friction, 0.35);
     // Held by what holds it, but for its swing on its own softness.
     assert!(
         speed_m_s.abs() < 5e-3,
@@ -216,7 +216,7 @@ fn block_on_a_slope_sticks_below_its_friction_angle_and_slides_above_by_coulombs
     );
 
     let slope = 0.6;
-    let (ratio, speed_m_s) = on_a_slope(friction, slope);
+    let (ratio, speed_m_s) = on_a_slope(params, friction, slope);
     // Coulomb's law holds place by place, and the places slope by 0.03 either way: 1 % less.
     assert!(
         (ratio / friction - 1.0).abs() < 0.03,
