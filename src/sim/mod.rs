@@ -72,7 +72,8 @@ pub struct SolverParams {
     pub timestep_s: f32,
     /// Substeps a step.
     pub substeps: u32,
-    /// Sweeps over all constraints a substep; more substeps are nearly always the better buy.
+    /// Sweeps over all constraints a substep, or Newton steps of the implicit method; more substeps
+    /// are nearly always the better buy.
     pub iterations: u32,
     /// Young's modulus E [Pa].
     pub youngs_modulus_pa: f32,

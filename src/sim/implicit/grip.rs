@@ -43,6 +43,11 @@ impl Grip {
         &self.holds
     }
 
+    /// Those of tools in the way.
+    pub fn touches(&self) -> &[Hold] {
+        &self.holds[..self.touches]
+    }
+
     /// Looks what the tools do to the body if it ends the substep at `displacements`, which is also
     /// where `particles` are.
     pub fn look(
