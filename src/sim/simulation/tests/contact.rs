@@ -168,7 +168,7 @@ fn ball_that_appears_inside_is_let_out_gently_on_the_nearest_side() {
 /// A block lies on a ball so large that it is nearly flat, and then gravity is tilted. Friction over
 /// pressure in the next steps, once the block has given way to its own shear, and how fast it goes
 /// after `SLOPE_STEPS` [m/s].
-pub(super) fn on_a_slope(params: SolverParams, friction: f32, slope: f32) -> (f32, f32) {
+fn on_a_slope(params: SolverParams, friction: f32, slope: f32) -> (f32, f32) {
     let mut setup = body(Vec3::new(0.06, 0.02, 0.06), 0.01, |_| false);
     let mass_kg: f32 = setup.masses_kg.iter().sum();
     setup.gravity_m_s2 = DOWN;

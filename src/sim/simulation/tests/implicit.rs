@@ -1,6 +1,6 @@
 //! The implicit method under tools, in long substeps, and after a wreck.
 
-use super::{contact::on_a_slope, *};
+use super::*;
 
 /// So many substeps of so many Newton steps.
 fn implicit(substeps: u32, iterations: u32) -> SolverParams {
@@ -67,47 +67,6 @@ fn tool_that_rests_feels_a_steady_force_and_that_of_the_default_method() {
                 forces_n[9]
             );
         }
-    }
-}
-
-#[test]
-fn block_that_lies_on_a_ball_presses_with_its_weight() {
-    for (substeps, iterations) in SETTINGS {
-        let mut setup = body(Vec3::new(0.06, 0.03, 0.06), 0.01, |_| false);
-        setup.gravity_m_s2 = DOWN;
-        setup.damping_per_s = 20.0;
-        let weight_n: f32 = setup.masses_kg.iter().sum::<f32>() * 9.81;
-        let mut simulation = Simulation::new(setup, implicit(substeps, iterations));
-        let table = tool(0.5, Vec3::new(0.03, -0.5, 0.03), ToolAction::Push);
-        for _ in 0..120 {
-            simulation.step(&[table]);
-        }
-        let force_n = simulation.report().tool_forces_n[0];
-        // Momentum has it exactly once nothing moves.
-        assert!(
-            (force_n + weight_n * Vec3::Y).length() < 0.01 * weight_n,
-            "{substeps} × {iterations}: {force_n} N for a weight of {weight_n} N"
-        );
-    }
-}
-
-#[test]
-fn block_on_a_slope_sticks_or_slides_by_coulombs_law() {
-    let (friction, slope) = (0.4, 0.6);
-    for params in [implicit(4, 1), implicit(20, 1)] {
-        let (ratio, speed_m_s) = on_a_slope(params, friction, 0.35);
-        // It swings on its own softness; 0.5 m/s if nothing held it.
-        assert!(speed_m_s.abs() < 2e-2, "goes at {speed_m_s} m/s");
-        assert!(
-            (ratio / 0.35 - 1.0).abs() < 0.1,
-            "{ratio} on a slope of 0.35"
-        );
-        let (ratio, _) = on_a_slope(params, friction, slope);
-        // Coulomb's law holds place by place, and the places slope by 0.03 either way.
-        assert!(
-            (ratio / friction - 1.0).abs() < 0.05,
-            "{ratio} for a friction of {friction}"
-        );
     }
 }
 
