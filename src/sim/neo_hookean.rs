@@ -37,7 +37,7 @@ mod kernel;
 
 use super::{
     Lame, SolverParams,
-    lanes::{Colored, LANES, Lanes, ParticleAccess},
+    lanes::{Batches, LANES, Lanes, ParticleAccess, add_spare},
     team::Team,
 };
 use crate::geom::TetMesh;
@@ -64,11 +64,11 @@ const WRECKED_VOLUMES: [f32; 2] = [-0.05, 0.1];
 /// All tetrahedra of a body.
 #[derive(Clone, Debug)]
 pub struct NeoHookean {
-    tets: Colored<Batch>,
+    tets: Batches<Batch>,
     tet_count: usize,
-    /// What the stresses do to each particle [m/s²], and the place that no particle owns.
+    /// What the stresses do to each particle [m/s²], and spare places.
     accelerations: Vec<Vec4>,
-    /// The last shape that was not wrecked [m], and the place that no particle owns.
+    /// The last shape that was not wrecked [m], and spare places.
     sound: Vec<Vec4>,
     /// What the responses and shares of `tets` were made for.
     ready_for: Option<SolverParams>,
@@ -95,7 +95,7 @@ impl NeoHookean {
     /// Tetrahedra `sound` of `mesh`, of which `fill` is the share that is tissue.
     pub fn new(mesh: &TetMesh, sound: &[u32], fill: &[f32]) -> Self {
         let corners: Vec<[u32; 4]> = sound.iter().map(|&tet| mesh.tets[tet as usize]).collect();
-        let tets = Colored::new(&corners, mesh.particles.len(), |members, corners| {
+        let tets = Batches::new(&corners, &mesh.particles, |members, corners| {
             let mut batch = Batch {
                 corners,
                 rest_inverse: Default::default(),
@@ -120,7 +120,7 @@ impl NeoHookean {
             batch
         });
         let mut rest: Vec<Vec4> = mesh.particles.iter().map(|x| x.extend(0.0)).collect();
-        rest.push(Vec4::ZERO);
+        add_spare(&mut rest);
         Self {
             tets,
             tet_count: sound.len(),
@@ -135,7 +135,7 @@ impl NeoHookean {
     }
 
     /// Starts a substep from the stress where the last one ended, and returns what that does to
-    /// each particle [m/s²]; the last entry is of the place that no particle owns.
+    /// each particle [m/s²]; the last entries are of spare places.
     pub fn begin_substep(
         &mut self,
         team: &Team,
@@ -147,7 +147,7 @@ impl NeoHookean {
         } else if self.sheds || self.overloaded {
             let (step, places) = (self.step, reading(particles));
             self.tets
-                .for_each_colored(team, &mut self.accelerations, |run, accelerations| {
+                .for_each_part(team, &mut self.accelerations, |run, accelerations| {
                     run_avx(run, Work::Shed, places, accelerations, places, step);
                 });
         }
@@ -165,7 +165,7 @@ impl NeoHookean {
             Work::Project
         };
         let overloaded = AtomicBool::new(false);
-        self.tets.for_each_colored(team, particles, |run, places| {
+        self.tets.for_each_part(team, particles, |run, places| {
             if run_avx(run, work, places, accelerations, sound, step) {
                 overloaded.store(true, Ordering::Relaxed);
             }
@@ -175,7 +175,7 @@ impl NeoHookean {
 
     /// Forgets all stress: the body was put somewhere else. A wrecked one is led back from there.
     pub fn forget(&mut self, particles: &mut [Vec4], params: &SolverParams) {
-        for batch in self.tets.batches_mut() {
+        for batch in self.tets.as_mut_slice() {
             batch.stress = Default::default();
         }
         self.accelerations.fill(Vec4::ZERO);
@@ -204,7 +204,7 @@ impl NeoHookean {
         let places = reading(particles);
         let volume_min = WRECKED_VOLUMES[usize::from(self.restoring)];
         let (squared_sum_pa2, wrecked) =
-            standing_of(self.tets.batches(), places, self.step, volume_min);
+            standing_of(self.tets.as_slice(), places, self.step, volume_min);
         let young_pa = f64::from(self.step.carried_max_pa / CARRIED_STRESS_IN_E);
         Residual {
             squared_sum: squared_sum_pa2 / (young_pa * young_pa),
@@ -220,7 +220,7 @@ impl NeoHookean {
         self.ready_for = Some(*params);
         let [mean_max, own_max] = CARRIED_STIFFNESS_MAX.map(|most| most * params.iterations as f32);
         let mut stiffness_sum = 0.0;
-        for batch in self.tets.batches_mut() {
+        for batch in self.tets.as_mut_slice() {
             for lane in 0..LANES {
                 let k = f64::from(step.h2_s2 * batch.volume_m3.0[lane]);
                 let mobility = mobility(batch, lane, particles);
@@ -240,7 +240,7 @@ impl NeoHookean {
         let mean = (stiffness_sum / self.tet_count.max(1) as f64) as f32;
         let kept_by_all = mean_max / mean.max(mean_max);
         self.sheds = false;
-        for batch in self.tets.batches_mut() {
+        for batch in self.tets.as_mut_slice() {
             for kept in &mut batch.kept.0 {
                 *kept = kept.min(kept_by_all);
                 self.sheds |= *kept < 1.0;
@@ -249,7 +249,7 @@ impl NeoHookean {
         self.accelerations.fill(Vec4::ZERO);
         let places = reading(particles);
         self.tets
-            .for_each_colored(team, &mut self.accelerations, |run, accelerations| {
+            .for_each_part(team, &mut self.accelerations, |run, accelerations| {
                 for batch in run {
                     batch.accelerate_anew::<false>(places, accelerations);
                 }

@@ -1,13 +1,16 @@
 //! The state of the particles.
 
-use super::team::{SharedSlice, Team};
+use super::{
+    lanes::add_spare,
+    team::{SharedSlice, Team},
+};
 use glam::{Vec3, Vec4};
 
 /// Positions, velocities and inverse masses of a body.
 #[derive(Clone, Debug)]
 pub struct Particles {
-    /// Position [m] and inverse mass [1/kg] of each particle, and one place that no particle owns
-    /// (see `lanes::Corners`).
+    /// Position [m] and inverse mass [1/kg] of each particle, and the spare places that
+    /// `lanes::Batches` want.
     pub places: Vec<Vec4>,
     /// Where each was when the substep started.
     pub previous: Vec<Vec4>,
@@ -26,7 +29,7 @@ impl Particles {
         let mut places: Vec<Vec4> = (rest.iter().zip(inverse_masses))
             .map(|(&x, &w)| x.extend(w))
             .collect();
-        places.push(Vec4::ZERO);
+        add_spare(&mut places);
         Self {
             previous: places.clone(),
             finite: places.clone(),

@@ -29,7 +29,7 @@ fn eight(moves: &[f32]) -> (TetMesh, Vec<Vec4>) {
         }
         mesh.tets.push([first, first + 1, first + 2, first + 3]);
     }
-    places.push(Vec4::ZERO);
+    add_spare(&mut places);
     (mesh, places)
 }
 
@@ -183,7 +183,7 @@ fn narrow_and_wide_vectors_give_the_same_bits() {
         let step = model.step;
         let accelerations = reading(&mut model.accelerations);
         let access = reading(&mut places);
-        for batch in model.tets.batches_mut() {
+        for batch in model.tets.as_mut_slice() {
             #[cfg(target_arch = "x86_64")]
             if wide && std::arch::is_x86_feature_detected!("avx2") {
                 batch.project::<true>(access, accelerations, step);
