@@ -61,6 +61,9 @@ const WRECKED_SHARES: [f64; 2] = [0.2, 0.01];
 /// is on its way back.
 const WRECKED_VOLUMES: [f32; 2] = [-0.05, 0.1];
 
+/// Batches a chunk, in looking how they stand: some microseconds.
+const BATCHES_PER_CHUNK: usize = 64;
+
 /// All tetrahedra of a body.
 #[derive(Clone, Debug)]
 pub struct NeoHookean {
@@ -179,14 +182,19 @@ impl NeoHookean {
             batch.stress = Default::default();
         }
         self.accelerations.fill(Vec4::ZERO);
-        self.assess(particles, params);
+        self.assess(&Team::alone(), particles, params);
     }
 
     /// How far stress and deformation are apart, after a step; decides whether the body is
     /// wrecked, and remembers its shape if it is not.
-    pub fn assess(&mut self, particles: &mut [Vec4], params: &SolverParams) -> Residual {
+    pub fn assess(
+        &mut self,
+        team: &Team,
+        particles: &mut [Vec4],
+        params: &SolverParams,
+    ) -> Residual {
         self.step = step_of(params);
-        let residual = self.standing(particles);
+        let residual = self.standing(team, particles);
         let share = residual.wrecked as f64 / residual.count.max(1) as f64;
         self.restoring = share > WRECKED_SHARES[usize::from(self.restoring)];
         if !self.restoring && residual.wrecked == 0 {
@@ -200,11 +208,15 @@ impl NeoHookean {
         self.restoring
     }
 
-    fn standing(&self, particles: &mut [Vec4]) -> Residual {
+    fn standing(&self, team: &Team, particles: &mut [Vec4]) -> Residual {
         let places = reading(particles);
         let volume_min = WRECKED_VOLUMES[usize::from(self.restoring)];
+        let chunks: Vec<&[Batch]> = self.tets.as_slice().chunks(BATCHES_PER_CHUNK).collect();
+        let standings = team.map(chunks.len(), |chunk| {
+            standing_of(chunks[chunk], places, self.step, volume_min)
+        });
         let (squared_sum_pa2, wrecked) =
-            standing_of(self.tets.as_slice(), places, self.step, volume_min);
+            (standings.into_iter()).fold((0.0, 0), |sum, own| (sum.0 + own.0, sum.1 + own.1));
         let young_pa = f64::from(self.step.carried_max_pa / CARRIED_STRESS_IN_E);
         Residual {
             squared_sum: squared_sum_pa2 / (young_pa * young_pa),

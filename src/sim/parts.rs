@@ -12,7 +12,7 @@ use glam::Vec3;
 /// Most parts a round.
 pub const PARTS_MAX: usize = 16;
 /// Constraints a part of the first round, at least: two slabs of fewer are mostly cut.
-const FIRST_PART_MIN: usize = 3000;
+pub const FIRST_PART_MIN: usize = 3000;
 /// Constraints a part of later rounds, at least: some microseconds, against the one of a meeting.
 const PART_MIN: usize = 96;
 /// After so many rounds one thread does the rest.
@@ -25,12 +25,15 @@ const ROUNDS_MAX: usize = 4;
 ///
 /// If a constraint names a particle beyond the last.
 pub fn rounds<const N: usize>(constraints: &[[u32; N]], particles: &[Vec3]) -> Vec<Vec<Vec<u32>>> {
+    let ranks = [0, 1, 2].map(|axis| ranks(particles, axis));
     let mut rounds = Vec::new();
     let mut left: Vec<u32> = (0..constraints.len() as u32).collect();
     let mut parts = power_of_two(left.len() / FIRST_PART_MIN);
     while parts > 1 && rounds.len() < ROUNDS_MAX {
-        let cuts = (0..3).map(|axis| cut(constraints, particles, &left, parts, axis));
-        let cut = cuts.min_by_key(|cut| cut.across.len());
+        let cuts = ranks
+            .each_ref()
+            .map(|rank| cut(constraints, rank, &left, parts));
+        let cut = cuts.into_iter().min_by_key(Cut::length);
         let cut = cut.expect("there are three axes");
         rounds.push(cut.parts);
         left = cut.across;
@@ -48,31 +51,53 @@ struct Cut {
     across: Vec<u32>,
 }
 
-/// Cuts the constraints `members` across an axis into `count` slabs of about as many each.
+impl Cut {
+    /// How long the threads are at it, counted in constraints, if what is across is left to one.
+    fn length(&self) -> usize {
+        self.parts.iter().map(Vec::len).max().unwrap_or(0) + self.across.len()
+    }
+}
+
+/// Place of each particle in the order along an axis; those in one plane follow each other along
+/// the other two, so that a cut may turn a corner in a plane.
+fn ranks(particles: &[Vec3], axis: usize) -> Vec<u32> {
+    let key = |&i: &u32| {
+        let x = particles[i as usize];
+        [0, 1, 2].map(|k| x[(axis + k) % 3])
+    };
+    let mut order: Vec<u32> = (0..particles.len() as u32).collect();
+    order.sort_by(|a, b| {
+        let ([a, b, c], [d, e, f]) = (key(a), key(b));
+        a.total_cmp(&d).then(b.total_cmp(&e)).then(c.total_cmp(&f))
+    });
+    let mut rank = vec![0; order.len()];
+    for (place, &particle) in order.iter().enumerate() {
+        rank[particle as usize] = place as u32;
+    }
+    rank
+}
+
+/// Cuts the constraints `members` into `count` slabs of about as many each, by the ranks of their
+/// particles.
 fn cut<const N: usize>(
     constraints: &[[u32; N]],
-    particles: &[Vec3],
+    rank: &[u32],
     members: &[u32],
     count: usize,
-    axis: usize,
 ) -> Cut {
-    let lowest = |&member: &u32| {
-        let places = constraints[member as usize].map(|i| particles[i as usize][axis]);
-        places.into_iter().fold(f32::INFINITY, f32::min)
-    };
-    let mut sorted: Vec<f32> = members.iter().map(lowest).collect();
-    sorted.sort_unstable_by(f32::total_cmp);
-    let cuts: Vec<f32> = (1..count)
-        .map(|slab| sorted[slab * sorted.len() / count])
+    let ranks_of = |member: u32| constraints[member as usize].map(|i| rank[i as usize]);
+    let mut middles: Vec<u32> = (members.iter())
+        .map(|&member| ranks_of(member).iter().sum::<u32>() / N as u32)
         .collect();
-    let slab_of = |particle: u32| {
-        let place = particles[particle as usize][axis];
-        cuts.partition_point(|&cut| cut <= place)
-    };
+    middles.sort_unstable();
+    let cuts: Vec<u32> = (1..count)
+        .map(|slab| middles[slab * middles.len() / count])
+        .collect();
+    let slab_of = |rank| cuts.partition_point(|&cut| cut <= rank);
     let mut parts = vec![Vec::new(); count];
     let mut across = Vec::new();
     for &member in members {
-        let slabs = constraints[member as usize].map(slab_of);
+        let slabs = ranks_of(member).map(slab_of);
         if slabs.iter().all(|&slab| slab == slabs[0]) {
             parts[slabs[0]].push(member);
         } else {

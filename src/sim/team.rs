@@ -1,8 +1,8 @@
-//! Threads that stay awake for the length of a step, so that a colour of a few hundred tetrahedra
-//! is worth sharing.
+//! Threads that stay awake for the length of a step, so that a job of a few hundred tetrahedra is
+//! worth sharing.
 //!
-//! A substep has some thirty colours of a few microseconds each. Waking a thread costs about as
-//! much, so rayon's own loops lose here. The helpers of a [`Team`] spin on one word for the length
+//! A substep has some jobs of a few microseconds each. Waking a thread costs about as much, so
+//! rayon's own loops lose here. The helpers of a [`Team`] spin on one word for the length
 //! of a step and claim chunks of whatever the leader has published there. The leader claims chunks
 //! too and waits for claimed ones only: with the other cores busy elsewhere it does all the work
 //! itself and loses next to nothing. Who does a chunk does not change its result.
@@ -11,7 +11,7 @@ use std::cell::UnsafeCell;
 use std::marker::PhantomData;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
-/// More helpers than this find too little to do in a colour.
+/// More helpers than this find too little to do.
 const HELPERS_MAX: usize = 7;
 /// A helper that has found nothing for so many looks lets other programs have the core.
 const PATIENCE: u32 = 4096;
@@ -115,6 +115,17 @@ impl Team {
         });
     }
 
+    /// What `job` makes of each chunk, in order.
+    pub fn map<R: Clone + Default + Send>(
+        &self,
+        chunks: usize,
+        job: impl Fn(usize) -> R + Sync,
+    ) -> Vec<R> {
+        let mut results = vec![R::default(); chunks];
+        self.for_runs(&mut results, 1, |chunk, result| result[0] = job(chunk));
+        results
+    }
+
     /// Does one chunk if there is one.
     fn claim_and_do(&self, end: End) -> bool {
         let word = self.claim.load(Ordering::Acquire);
@@ -154,7 +165,7 @@ impl Team {
 }
 
 /// Which end of a job chunks are claimed from. The leader takes the first and helpers the last, so
-/// that from one colour to the next each works in the same part of the body, on particles that are
+/// that from one job to the next each works in the same part of the body, on particles that are
 /// still in its core's cache.
 #[derive(Clone, Copy)]
 enum End {
