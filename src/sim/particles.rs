@@ -4,7 +4,7 @@ use super::{
     lanes::add_spare,
     team::{SharedSlice, Team},
 };
-use glam::{Vec3, Vec4};
+use glam::{Vec3, Vec3A, Vec4};
 
 /// Positions, velocities and inverse masses of a body.
 #[derive(Clone, Debug)]
@@ -20,8 +20,8 @@ pub struct Particles {
     finite: Vec<Vec4>,
 }
 
-/// Particles a chunk: about a microsecond.
-const PARTICLES_PER_CHUNK: usize = 512;
+/// Particles a chunk: about half a microsecond.
+const PARTICLES_PER_CHUNK: usize = 256;
 
 impl Particles {
     /// Particles at `rest`, still.
@@ -102,6 +102,19 @@ impl Particles {
             .map(|(place, other)| (*place - *other).truncate().length_squared())
             .fold(0.0, f32::max)
             .sqrt()
+    }
+
+    /// Volume of tetrahedra [m³] and the number of negative ones. Each in f32, with an error of less
+    /// than 10⁻⁶ of the cube of its longest edge, the sum in f64.
+    pub fn volume_and_inverted(&self, tets: &[[u32; 4]]) -> (f64, usize) {
+        let (mut sum, mut inverted) = (0.0, 0);
+        for tet in tets {
+            let [a, b, c, d] = tet.map(|i| Vec3A::from_vec4(self.places[i as usize]));
+            let volume = (b - a).dot((c - a).cross(d - a)) / 6.0;
+            sum += f64::from(volume);
+            inverted += usize::from(volume < 0.0);
+        }
+        (sum, inverted)
     }
 
     /// Fastest particle [m/s].

@@ -14,7 +14,7 @@ pub const PARTS_MAX: usize = 16;
 /// Constraints a part of the first round, at least: two slabs of fewer are mostly cut.
 pub const FIRST_PART_MIN: usize = 3000;
 /// Constraints a part of later rounds, at least: some microseconds, against the one of a meeting.
-const PART_MIN: usize = 96;
+const PART_MIN: usize = 48;
 /// After so many rounds one thread does the rest.
 const ROUNDS_MAX: usize = 4;
 

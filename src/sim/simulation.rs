@@ -3,7 +3,7 @@
 use super::{
     BodySetup, SolverParams, StepReport, ToolInput,
     contact::{DEPENETRATION_SPEED_M_S, Surface},
-    diagnose::{rest_volume_m3, volume_and_inverted},
+    diagnose::rest_volume_m3,
     grab::Tissue,
     model::Model,
     particles::Particles,
@@ -88,12 +88,13 @@ impl Simulation {
             .map(|&tet| rest_volume_m3(mesh, tet as usize) * f64::from(setup.fill[tet as usize]))
             .sum();
         let mass_kg: f64 = setup.masses_kg.iter().map(|&mass| f64::from(mass)).sum();
-        let rest_volume_m3 = volume_and_inverted(&mesh.particles, &sound_tets).0;
+        let particles = Particles::new(&mesh.particles, &inverse_masses(&setup));
+        let rest_volume_m3 = particles.volume_and_inverted(&sound_tets).0;
         // The edge of a regular tetrahedron of the mean volume.
         let mean_volume = rest_volume_m3 / sound.len().max(1) as f64;
         let mut simulation = Self {
             model: Model::new(params.method, mesh, &sound, &setup.fill),
-            particles: Particles::new(&mesh.particles, &inverse_masses(&setup)),
+            particles,
             tools: Tools::default(),
             positions: mesh.particles.clone(),
             points: vec![Vec3::ZERO; setup.embedding.particles.len()],
@@ -373,7 +374,7 @@ impl Simulation {
         self.publish();
         let chunks: Vec<&[[u32; 4]]> = self.sound_tets.chunks(TETS_PER_CHUNK).collect();
         let parts = team.map(chunks.len(), |chunk| {
-            volume_and_inverted(&self.positions, chunks[chunk])
+            self.particles.volume_and_inverted(chunks[chunk])
         });
         Standing {
             residual_rms,
