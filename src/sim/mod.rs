@@ -25,6 +25,7 @@ pub use simulation::Simulation;
 
 use crate::geom::{Embedding, TetMesh, bounds};
 use glam::Vec3;
+use parts::SHARED_TETS_MIN;
 use serde::{Deserialize, Serialize};
 
 /// How the body resists deformation, and how that is solved.
@@ -166,13 +167,16 @@ impl BodySetup {
         ])
     }
 
-    /// The same body, its particles numbered along its longest side: what threads work on at the
-    /// same time is then apart in memory too.
+    /// The same body; if it is large enough to be shared by threads, with its particles numbered
+    /// along its longest side: what they work on at the same time is then apart in memory too.
     ///
     /// # Panics
     ///
     /// If the lists do not fit each other.
     pub fn numbered_along(mut self) -> Self {
+        if self.tets.tets.len() < SHARED_TETS_MIN {
+            return self;
+        }
         let old = &self.tets.particles;
         let (low, high) = bounds(old);
         let axis = (high - low).max_position();

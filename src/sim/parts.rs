@@ -12,7 +12,9 @@ use glam::Vec3;
 /// Most parts a round.
 pub const PARTS_MAX: usize = 16;
 /// Constraints a part of the first round, at least: two slabs of fewer are mostly cut.
-pub const FIRST_PART_MIN: usize = 3000;
+const FIRST_PART_MIN: usize = 3000;
+/// A smaller body is one part.
+pub const SHARED_TETS_MIN: usize = 2 * FIRST_PART_MIN;
 /// Constraints a part of later rounds, at least: some microseconds, against the one of a meeting.
 const PART_MIN: usize = 48;
 /// After so many rounds one thread does the rest.

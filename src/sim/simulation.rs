@@ -7,7 +7,7 @@ use super::{
     grab::Tissue,
     model::Model,
     particles::Particles,
-    parts::FIRST_PART_MIN,
+    parts::SHARED_TETS_MIN,
     team::Team,
     tools::{Met, Tools},
 };
@@ -20,8 +20,6 @@ const CALM_SIZES: f32 = 1e-4;
 /// Calm for so long, it falls asleep [s]: longer than it hangs still at the turning point of a
 /// swing.
 const CALM_S: f32 = 0.5;
-/// A smaller body is one part: see [`super::parts`].
-const SHARED_TETS_MIN: usize = 2 * FIRST_PART_MIN;
 /// Tetrahedra a chunk, in adding up volumes: some microseconds.
 const TETS_PER_CHUNK: usize = 1024;
 /// Points a task, in bringing the surface up to date.

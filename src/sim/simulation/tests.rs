@@ -9,6 +9,7 @@ mod sleep;
 use super::*;
 use crate::geom::SurfaceMesh;
 use crate::geom::lattice::{Lattice, block, sphere};
+use crate::sim::parts::SHARED_TETS_MIN;
 use crate::sim::{Method, ToolAction, ToolShape, diagnose};
 use proptest::prelude::*;
 
@@ -522,15 +523,48 @@ fn crushed_body_recovers_its_shape() {
     }
 }
 
+#[test]
+fn numbering_along_the_longest_side_changes_the_numbers_alone() {
+    let before = body(Vec3::new(0.25, 0.06, 0.06), 0.0085, |x| x.y < 1e-6);
+    let after = before.clone().numbered_along();
+    assert!(after.tets.particles.is_sorted_by(|a, b| a.x <= b.x));
+    assert!(!before.tets.particles.is_sorted_by(|a, b| a.x <= b.x));
+    let corners = |setup: &BodySetup| -> Vec<_> {
+        let of = |i: u32| {
+            (
+                setup.tets.particles[i as usize],
+                setup.masses_kg[i as usize],
+            )
+        };
+        let tets = setup.tets.tets.iter().chain(&setup.embedding.particles);
+        tets.map(|tet| tet.map(of)).collect()
+    };
+    assert_eq!(corners(&after), corners(&before));
+    let held = |setup: &BodySetup| {
+        let of = (setup.tets.particles.iter().zip(&setup.fixed)).filter(|(_, held)| **held);
+        of.fold((Vec3::ZERO, 0), |(sum, count), (x, _)| {
+            (sum + *x, count + 1)
+        })
+    };
+    let (sums, counts) = (
+        held(&before).0 - held(&after).0,
+        (held(&before).1, held(&after).1),
+    );
+    assert_eq!(counts.0, counts.1);
+    // Sums of a thousand places of 0.25 m, in another order.
+    assert!(sums.length() < 1e-3, "{sums}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
     #[test]
     fn bits_do_not_depend_on_the_number_of_threads(
         x in 0.05_f32..0.2, z in 0.05_f32..0.2, slide in -0.01_f32..0.01, method in 0_usize..3,
     ) {
-        // Large enough that colours are shared out: see `lanes::BATCHES_PER_TASK`.
+        // Large enough for several parts.
         let run = |threads: usize| {
             let setup = body(Vec3::new(0.25, 0.06, 0.25), 0.0085, |x| x.y < 1e-6);
+            assert!(setup.tets.tets.len() >= SHARED_TETS_MIN);
             let mut simulation = Simulation::new(setup, soft(Method::ALL[method]));
             simulation.set_threads(Some(threads));
             let mut forces = Vec::new();
