@@ -168,7 +168,8 @@ impl BodySetup {
     }
 
     /// The same body; if it is large enough to be shared by threads, with its particles numbered
-    /// along its longest side: what they work on at the same time is then apart in memory too.
+    /// along its longest side: what they work on at the same time is then apart in memory too. Two
+    /// cores that write to one cache line in turn wait for each other every time.
     ///
     /// # Panics
     ///
@@ -177,15 +178,9 @@ impl BodySetup {
         if self.tets.tets.len() < SHARED_TETS_MIN {
             return self;
         }
-        let old = &self.tets.particles;
-        let (low, high) = bounds(old);
-        let axis = (high - low).max_position();
-        let mut order: Vec<u32> = (0..old.len() as u32).collect();
-        order.sort_by(|&a, &b| f32::total_cmp(&old[a as usize][axis], &old[b as usize][axis]));
-        let mut number = vec![0; order.len()];
-        for (new, &old) in order.iter().enumerate() {
-            number[old as usize] = new as u32;
-        }
+        let (low, high) = bounds(&self.tets.particles);
+        let order = parts::order_along(&self.tets.particles, (high - low).max_position());
+        let number = parts::places_in(&order);
         let corners = self
             .tets
             .tets

@@ -27,7 +27,7 @@ const ROUNDS_MAX: usize = 4;
 ///
 /// If a constraint names a particle beyond the last.
 pub fn rounds<const N: usize>(constraints: &[[u32; N]], particles: &[Vec3]) -> Vec<Vec<Vec<u32>>> {
-    let ranks = [0, 1, 2].map(|axis| ranks(particles, axis));
+    let ranks = [0, 1, 2].map(|axis| places_in(&order_along(particles, axis)));
     let mut rounds = Vec::new();
     let mut left: Vec<u32> = (0..constraints.len() as u32).collect();
     let mut parts = power_of_two(left.len() / FIRST_PART_MIN);
@@ -60,9 +60,9 @@ impl Cut {
     }
 }
 
-/// Place of each particle in the order along an axis; those in one plane follow each other along
-/// the other two, so that a cut may turn a corner in a plane.
-fn ranks(particles: &[Vec3], axis: usize) -> Vec<u32> {
+/// The particles in their order along an axis; those in one plane follow each other along the other
+/// two axes, so that a cut may turn a corner in a plane.
+pub fn order_along(particles: &[Vec3], axis: usize) -> Vec<u32> {
     let key = |&i: &u32| {
         let x = particles[i as usize];
         [0, 1, 2].map(|k| x[(axis + k) % 3])
@@ -72,11 +72,16 @@ fn ranks(particles: &[Vec3], axis: usize) -> Vec<u32> {
         let ([a, b, c], [d, e, f]) = (key(a), key(b));
         a.total_cmp(&d).then(b.total_cmp(&e)).then(c.total_cmp(&f))
     });
-    let mut rank = vec![0; order.len()];
+    order
+}
+
+/// The place of each particle in an order.
+pub fn places_in(order: &[u32]) -> Vec<u32> {
+    let mut places = vec![0; order.len()];
     for (place, &particle) in order.iter().enumerate() {
-        rank[particle as usize] = place as u32;
+        places[particle as usize] = place as u32;
     }
-    rank
+    places
 }
 
 /// Cuts the constraints `members` into `count` slabs of about as many each, by the ranks of their
