@@ -232,6 +232,8 @@ impl Simulation {
                 self.particles.places[i] = position.extend(0.0);
             }
         }
+        self.model.forget(&mut self.particles.places, &self.solver);
+        self.tools.forget_sides();
         self.wake();
         self.publish();
     }
