@@ -16,6 +16,9 @@ fn params(method: Method) -> SolverParams {
     }
 }
 
+/// Root mean square distance of the lump's mass from its centre [m].
+const GYRATION_RADIUS_M: f64 = 0.0183;
+
 /// A free body of no symmetry, 4 × 3 × 3 cm.
 fn lump_of_tissue() -> BodySetup {
     let size_m = Vec3::new(0.04, 0.03, 0.03);
@@ -73,9 +76,9 @@ proptest! {
     #![proptest_config(cases(8))]
     #[test]
     fn momentum_and_spin_are_kept_without_outer_forces(
-        fly in prop::array::uniform3(0.1_f32..0.4), spin in prop::array::uniform3(-1.0_f32..7.0),
+        fly in prop::array::uniform3(0.1_f32..0.4), spin in prop::array::uniform3(1.0_f32..8.0),
     ) {
-        let (fly, spin) = (Vec3::from(fly), Vec3::from(spin) + 1.0);
+        let (fly, spin) = (Vec3::from(fly), Vec3::from(spin));
         for method in Method::ALL {
             let (linear, _) = momentum_lost(method, fly, spin, 0.05, 20);
             // About where it is: half a metre away, coordinates are rounded by as much as a spring moves them.
@@ -83,10 +86,13 @@ proptest! {
             // Rounding of positions, 2e-9 m, becomes one of velocities of 2e-6 m/s in each of 600 substeps:
             // 1.3e-3 of 0.17 m/s measured, from what is one-sided in it.
             prop_assert!(linear < 3e-3, "{method:?} lost {linear} of its momentum");
-            // Forces that act at the end of a substep take (hω)²/2 of the spin each time; mass-spring's act at
-            // its start.
+            // Forces that act at the end of a substep take (hω)²/2 of the spin each time, and more of a body
+            // that the spin stretches; mass-spring's act at its start.
             let turn = f64::from(spin.length()) / 1200.0;
-            let limit = 2.0 * 600.0 * turn * turn / 2.0 + 3e-3;
+            // What rounding takes is a speed and does not grow with the spin: 2e-4 m/s of xpbd-springs measured
+            // from 0.3 to 3.5 rad/s.
+            let rounding = 4e-4 / (GYRATION_RADIUS_M * f64::from(spin.length()));
+            let limit = 2.0 * 600.0 * turn * turn / 2.0 + rounding;
             prop_assert!(angular < limit, "{method:?} lost {angular} of its spin, above {limit}");
         }
     }
