@@ -326,40 +326,13 @@ fn fast_poke_does_not_tunnel() {
 #[test]
 fn tool_that_appears_inside_the_body_does_not_fling_it_away() {
     let mut simulation = Simulation::new(slab(), soft(Method::XpbdNeoHookean));
-    let mut fastest = 0.0_f32;
     for step in 0..60 {
         let ball = tool(0.015, Vec3::new(0.04, 0.025, 0.04), ToolAction::Push);
         let speed = simulation.step(&[ball]).speed_max_m_s;
-        // The surface leaves at half a metre a second. Single particles below it are squeezed out
-        // faster, 5.2 m/s for one step; then the body must be calm.
-        assert!(speed < 8.0, "{speed} m/s in step {step}");
-        if step > 0 {
-            fastest = fastest.max(speed);
-        }
+        // It comes in at half a metre a second; particles beside it go 0.6 m/s.
+        assert!(speed < 1.0, "{speed} m/s in step {step}");
     }
-    assert!(fastest < 2.0, "{fastest} m/s");
     assert!(all_finite(&simulation));
-}
-
-#[test]
-fn body_resting_on_a_tool_presses_on_it_with_its_weight() {
-    let mut setup = body(Vec3::new(0.06, 0.03, 0.06), 0.01, |_| false);
-    setup.gravity_m_s2 = DOWN;
-    setup.damping_per_s = 20.0;
-    let weight: f32 = setup.masses_kg.iter().sum::<f32>() * 9.81;
-    let mut simulation = Simulation::new(setup, soft(Method::XpbdNeoHookean));
-    let table = tool(0.5, Vec3::new(0.03, -0.5, 0.03), ToolAction::Push);
-    let mut force = Vec3::ZERO;
-    for step in 0..150 {
-        let report = simulation.step(&[table]);
-        if step >= 120 {
-            force += report.tool_forces_n[0] / 30.0;
-        }
-    }
-    assert!(
-        (force.y / -weight - 1.0).abs() < 0.1,
-        "{force} for a weight of {weight} N"
-    );
 }
 
 #[test]
