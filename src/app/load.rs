@@ -149,7 +149,7 @@ pub fn body(scene: &Scene) -> Result<LoadedBody, AppError> {
     Ok(LoadedBody {
         mesh,
         rest,
-        setup,
+        setup: setup.numbered_along(),
         notes,
     })
 }

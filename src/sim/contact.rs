@@ -1,9 +1,9 @@
 //! One rigid tool against the surface of the body: swept, one-sided, with friction.
 //!
 //! Everything is looked at in the frame of the tool, where the tool stands still and the triangles
-//! of the surface move. Of each triangle the place that is nearest to the tool's axis is kept out of
-//! the tool; a triangle that goes far in a substep is swept, and held where it first comes to the
-//! tool ([`sweep`]). Such a [`Touch`] is an inequality with a multiplier that is never negative and
+//! of the surface move. Of each point, side and face the place that is nearest to the tool's axis is
+//! kept out of the tool; one that goes far in a substep is swept, and held where it first comes to
+//! the tool ([`sweep`]). Such a [`Touch`] is an inequality with a multiplier that is never negative and
 //! Coulomb friction. Multiplier over h² is force.
 //!
 //! Two kinds of solver use it. One that alternates calls [`Contacts::solve`] after its own sweep. One
@@ -343,6 +343,7 @@ impl Contacts {
             let end = corners.map(|corner| corner.end);
             let seen = Seen {
                 axis: near.feature.axis(tool.shape),
+                is_side: matches!(near.feature, Feature::Side { .. }),
                 radius_m: near.radius_m,
                 start,
                 end,
@@ -439,6 +440,7 @@ impl Contacts {
 /// A triangle that may touch, in the frame of the tool.
 struct Seen {
     axis: Axis,
+    is_side: bool,
     radius_m: f32,
     start: [Vec3; 3],
     end: [Vec3; 3],
@@ -504,11 +506,15 @@ impl Seen {
     }
 
     /// The normal of the nearest place, and whether the place is on the side of the axis where it
-    /// was in the last substep: 1 if so, −1 if the axis has gone through the face since.
+    /// was in the last substep: 1 if so, −1 if the axis has gone through the face or side since.
     fn on_its_side(&self, found: &Nearest, corners: [Vec3; 3], known: Option<Vec3>) -> (Vec3, f32) {
         let normal = found.normal(corners);
-        let on_face = found.weights.min_element() > 0.0;
-        if on_face && known.is_some_and(|known| normal.dot(known) < OTHER_SIDE_COSINE) {
+        let within = if self.is_side {
+            found.weights.max_element() < 1.0
+        } else {
+            found.weights.min_element() > 0.0
+        };
+        if within && known.is_some_and(|known| normal.dot(known) < OTHER_SIDE_COSINE) {
             (-normal, -1.0)
         } else {
             (normal, 1.0)

@@ -9,6 +9,9 @@ use std::collections::BTreeSet;
 const STRAIN_MAX: f32 = 2.0;
 /// Stiffness of the hold over that of the tissue it holds.
 const STIFFNESS_OVER_TISSUE: f32 = 20.0;
+/// What is pulled beforehand, as in the last substep, moves no point by more than this share of the
+/// radius.
+const PULL_ON_RADII: f32 = 0.5;
 /// If the tool reaches no point, the nearest one within this many radii is held.
 const REACH_RADII: f32 = 3.0;
 
@@ -20,6 +23,8 @@ pub struct Grab {
     compliance_m_per_n: f32,
     /// Largest force of each hold [N].
     force_max_n: f32,
+    /// Radius of the tool [m].
+    radius_m: f32,
 }
 
 /// One point held.
@@ -111,13 +116,20 @@ impl Grab {
             holds,
             compliance_m_per_n: 1.0 / (share * stiffness),
             force_max_n: share * mass_kg * acceleration_max,
+            radius_m,
         })
     }
 
-    /// Sets all multipliers to 0, as a substep starts.
-    pub fn begin_substep(&mut self) {
+    /// Starts a substep by pulling as in the last one, before anything answers: a body that hangs
+    /// still is pulled by the right amount then. `scale` is h² over that of the last substep.
+    pub fn pull_on(&mut self, scale: f32, places: &mut [Vec4]) {
+        let farthest_m = (self.holds.iter())
+            .map(|hold| scale * hold.multiplier.length() * hold.handle.inverse_mass)
+            .fold(0.0, f32::max);
+        let share = scale * (PULL_ON_RADII * self.radius_m / farthest_m).min(1.0);
         for hold in &mut self.holds {
-            hold.multiplier = Vec3::ZERO;
+            hold.multiplier *= share;
+            hold.handle.push(places, hold.multiplier);
         }
     }
 

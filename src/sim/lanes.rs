@@ -8,8 +8,12 @@
     reason = "one counter for several arrays of the same fixed length"
 )]
 
-use super::team::{SharedSlice, Team};
-use glam::Vec4;
+use super::{
+    coloring::color,
+    parts::{self, PARTS_MAX},
+    team::{SharedSlice, Team},
+};
+use glam::{Vec3, Vec4};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Constraints a batch.
@@ -168,10 +172,19 @@ impl Neg for Lanes3 {
     }
 }
 
-/// Corners of the eight constraints of a batch; a lane that is not used has `UNUSED` in all.
-///
-/// `UNUSED` is the last place of the particle array, which no constraint owns and nothing moves.
+/// Corners of the eight constraints of a batch; a lane that is not used has a spare place in all.
 pub type Corners<const N: usize> = [[u32; LANES]; N];
+
+/// Spare places of a part, of which it uses the first: a cache line of its own.
+const SPARE_A_PART: usize = 4;
+/// Places behind those of the particles, which no particle owns and nothing moves: the unused lanes
+/// of a batch read and write one of them.
+const SPARE: usize = SPARE_A_PART * PARTS_MAX;
+
+/// Adds the spare places to one place a particle.
+pub fn add_spare(places: &mut Vec<Vec4>) {
+    places.resize(places.len() + SPARE, Vec4::ZERO);
+}
 
 /// Positions and inverse masses of one corner of eight constraints.
 #[derive(Clone, Copy, Default)]
@@ -180,16 +193,16 @@ pub struct Corner {
     pub inverse_mass: Lanes,
 }
 
-/// The particles, for the batches of one colour to read and write at the same time.
+/// The particles, for the parts of one round to read and write at the same time.
 ///
-/// Sound as long as no two batches that run together name the same particle and every index is
-/// inside: [`Colored`] alone makes batches' corners and accesses, and sees to both.
+/// Sound as long as no two parts that run together name the same particle and every index is
+/// inside: [`Batches`] alone makes batches' corners and accesses, and sees to both.
 #[derive(Clone, Copy)]
 pub struct ParticleAccess {
     first: *mut Vec4,
 }
 
-// SAFETY: the batches of one colour touch disjoint particles (see `for_each_colored`).
+// SAFETY: the parts of one round touch disjoint particles (see `for_each_part`).
 unsafe impl Send for ParticleAccess {}
 // SAFETY: as above.
 unsafe impl Sync for ParticleAccess {}
@@ -225,8 +238,7 @@ impl ParticleAccess {
                 value.position.z.0[lane],
                 value.inverse_mass.0[lane],
             );
-            // SAFETY: as in `gather`. Unused lanes all write the value they read, one batch a
-            // colour.
+            // SAFETY: as in `gather`. Unused lanes all write the value they read.
             unsafe { *self.first.add(corner[lane] as usize) = particle };
         }
     }
@@ -342,69 +354,73 @@ mod wide {
     }
 }
 
-/// Batches of constraints sorted by colour.
+/// Batches of constraints in rounds of parts that can be worked on at the same time.
 #[derive(Clone, Debug, Default)]
-pub struct Colored<B> {
+pub struct Batches<B> {
     batches: Vec<B>,
-    /// Where each colour ends in `batches`.
-    ends: Vec<usize>,
-    /// Particles the corners point into, the unused place not counted.
+    /// Where each part of each round ends in `batches`.
+    rounds: Vec<Vec<usize>>,
+    /// Particles the corners point into, spare places not counted.
     particle_count: usize,
 }
 
-/// Batches a chunk: some microseconds, against the tenth of one that it costs to claim it.
-const BATCHES_PER_CHUNK: usize = 12;
-
-impl<B: Send + Sync> Colored<B> {
-    /// Colours the constraints and packs each colour into batches.
+impl<B: Send + Sync> Batches<B> {
+    /// Splits the constraints of `particles` [m] into parts, and packs the constraints of a part,
+    /// colour after colour.
     ///
     /// `pack` is given up to eight constraint numbers and their corners, unused lanes filled up.
+    ///
+    /// # Panics
+    ///
+    /// If a constraint names a particle beyond the last.
     pub fn new<const N: usize>(
         constraints: &[[u32; N]],
-        particle_count: usize,
+        particles: &[Vec3],
         pack: impl Fn(&[u32], Corners<N>) -> B,
     ) -> Self {
-        let unused = particle_count as u32;
-        assert!(
-            constraints.iter().flatten().all(|&i| i < unused),
-            "every corner is a particle"
-        );
-        let mut colored = Self {
+        let mut packed = Self {
             batches: Vec::new(),
-            ends: Vec::new(),
-            particle_count,
+            rounds: Vec::new(),
+            particle_count: particles.len(),
         };
-        for color in super::coloring::color(constraints, particle_count) {
-            for members in color.chunks(LANES) {
-                let mut corners = [[unused; LANES]; N];
-                for (lane, &constraint) in members.iter().enumerate() {
-                    for corner in 0..N {
-                        corners[corner][lane] = constraints[constraint as usize][corner];
+        for round in parts::rounds(constraints, particles) {
+            let mut ends = Vec::with_capacity(round.len());
+            for (part, members) in round.iter().enumerate() {
+                let unused = (particles.len() + part * SPARE_A_PART) as u32;
+                for color in color(constraints, members, particles.len()) {
+                    for members in color.chunks(LANES) {
+                        let mut corners = [[unused; LANES]; N];
+                        for (lane, &constraint) in members.iter().enumerate() {
+                            for corner in 0..N {
+                                corners[corner][lane] = constraints[constraint as usize][corner];
+                            }
+                        }
+                        packed.batches.push(pack(members, corners));
                     }
                 }
-                colored.batches.push(pack(members, corners));
+                ends.push(packed.batches.len());
             }
-            colored.ends.push(colored.batches.len());
+            packed.rounds.push(ends);
         }
-        colored
+        packed
     }
 
-    /// All batches, colour after colour.
-    pub fn batches(&self) -> &[B] {
+    /// All batches, in the order in which one thread works on them.
+    pub fn as_slice(&self) -> &[B] {
         &self.batches
     }
 
     /// All batches, to be changed one by one.
-    pub fn batches_mut(&mut self) -> &mut [B] {
+    pub fn as_mut_slice(&mut self) -> &mut [B] {
         &mut self.batches
     }
 
-    /// Runs `f` over runs of batches, colour after colour; the runs of one colour run together.
+    /// Runs `f` over the batches of each part, round after round; the parts of a round run together.
     ///
     /// # Panics
     ///
-    /// If `particles` is not as long as when the batches were made, and the unused place.
-    pub fn for_each_colored(
+    /// If `particles` is not as long as when the batches were made, and the spare places.
+    pub fn for_each_part(
         &mut self,
         team: &Team,
         particles: &mut [Vec4],
@@ -412,22 +428,21 @@ impl<B: Send + Sync> Colored<B> {
     ) {
         assert_eq!(
             particles.len(),
-            self.particle_count + 1,
+            self.particle_count + SPARE,
             "the particles the batches were made for"
         );
         let access = ParticleAccess {
             first: particles.as_mut_ptr(),
         };
         let batches = SharedSlice::new(&mut self.batches);
-        let mut start = 0;
-        for &end in &self.ends {
-            team.run((end - start).div_ceil(BATCHES_PER_CHUNK), |chunk| {
-                let from = start + chunk * BATCHES_PER_CHUNK;
-                // SAFETY: chunks are told apart by their number, each is run once.
-                let run = unsafe { batches.run(from, end.min(from + BATCHES_PER_CHUNK)) };
-                f(run, access);
+        let mut first = 0;
+        for ends in &self.rounds {
+            team.run(ends.len(), |part| {
+                let start = part.checked_sub(1).map_or(first, |before| ends[before]);
+                // SAFETY: parts do not overlap, and each is run once.
+                f(unsafe { batches.run(start, ends[part]) }, access);
             });
-            start = end;
+            first = ends.last().copied().unwrap_or(first);
         }
     }
 }

@@ -143,6 +143,7 @@ impl MassSpring {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sim::lanes::add_spare;
     use crate::{geom::lattice::block_of_cells, sim::constraint};
 
     #[test]
@@ -160,7 +161,7 @@ mod tests {
                 (x + 5e-4 * shake).extend(inverse_mass)
             })
             .collect();
-        places.push(Vec4::ZERO);
+        add_spare(&mut places);
         let mut gradient = vec![Vec3::ZERO; mesh.particles.len()];
         for edge in &edges {
             let x = edge.particles.map(|i| places[i as usize].truncate());

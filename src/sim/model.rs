@@ -109,13 +109,18 @@ impl Model {
     /// RMS of what is left of the constraints after a step, free of units: C + α̃λ over rest length
     /// or volume, or the misfit of stress and deformation over Young's modulus; 0 for a model
     /// without constraints.
-    pub fn residual_rms(&mut self, particles: &mut [Vec4], params: &SolverParams) -> f32 {
+    pub fn residual_rms(
+        &mut self,
+        team: &Team,
+        particles: &mut [Vec4],
+        params: &SolverParams,
+    ) -> f32 {
         let (sum, count) = match self {
             Self::Implicit(model) => return model.residual_share(),
             Self::MassSpring(_) => (0.0, 0),
             Self::Springs(model) => model.residual(particles, params.lame(), params.substep_s()),
             Self::NeoHookean(model) => {
-                let residual = model.assess(particles, params);
+                let residual = model.assess(team, particles, params);
                 (residual.squared_sum, residual.count)
             }
         };

@@ -21,7 +21,13 @@
 //!   rest is then exactly in balance, however few sweeps it gets; from zero, as textbooks start,
 //!   each substep finds only a part of the force and the body sags.
 //! * What is carried over acts where the last substep left the body, so an explicit step is hidden
-//!   in it. It is cut where that would be unstable: see [`CARRIED_STIFFNESS_MAX`] and
+//!   in it, and in smooth waves, of which one sweep finds only a share g of the change, the stress
+//!   lags behind by 1/g substeps. A wave that turns by the angle φ a substep then grows if
+//!   1/g > L + 1 + φ², where each change D acts at once but L D is added to the stress: a lead,
+//!   which is gone where nothing changes. L = 1 is what the equations above say; 1.2 lets a little
+//!   more stiffness pass, and near 2 the shortest waves grow. For shear 1/g is 1 + 2 θ h² V μ S,
+//!   about 1 + κ/7 with κ = h² V (λ+2μ) tr S and ν = 0.45.
+//! * It is cut where it would be unstable still: see [`CARRIED_STIFFNESS_MAX`], [`Carry`] and
 //!   [`CARRIED_STRESS_IN_E`].
 //!
 //! Sources: Macklin, Müller, Chentanez, "XPBD: Position-Based Simulation of Compliant Constrained
@@ -37,7 +43,7 @@ mod kernel;
 
 use super::{
     Lame, SolverParams,
-    lanes::{Colored, LANES, Lanes, ParticleAccess},
+    lanes::{Batches, LANES, Lanes, ParticleAccess, add_spare},
     team::Team,
 };
 use crate::geom::TetMesh;
@@ -45,12 +51,20 @@ use glam::{DMat3, DVec3, Vec4};
 use kernel::{Batch, OWN_RESPONSE, STIFFNESS_IN_MU, Step};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Largest κ = h² V (λ+2μ) tr S, over the number of sweeps, whose stress is carried over whole:
-/// mean over the body, and of a single tetrahedron. Above, the share falls as its inverse. A
-/// uniform mesh of spacing d has about 6 (h c/d)², c being the speed of sound. What is carried over
-/// lags behind by a substep or more, which feeds smooth waves; from a mean of about 25 on they grow
-/// in a beam of 50,000 tetrahedra. Slivers jitter if 150 is let pass for one.
+/// Largest κ, over the number of sweeps, whose stress is carried over whole: mean over a body of up
+/// to [`SMALL_TETS`] tetrahedra, and of a single tetrahedron. Above, the share falls as its inverse.
+/// A uniform mesh of spacing d has about 2 (h c/d)², c being the speed of sound. Slivers jitter if
+/// 150 is let pass for one.
 pub const CARRIED_STIFFNESS_MAX: [f32; 2] = [12.0, 40.0];
+/// A body of more tetrahedra has room for longer waves, which grow earlier: its limit falls as the
+/// inverse of the number of tetrahedra along a side.
+const SMALL_TETS: f32 = 1e4;
+/// The mean limit of a body whose waves have been seen to grow: none was seen to below 5.
+const CARRIED_STIFFNESS_SAFE: f32 = 5.0;
+/// A misfit of stress and deformation beyond this, in Young's moduli, for so many steps is that of
+/// waves that grow; a beam that swings has half of it at the turning points.
+const GROWN_RESIDUAL: f64 = 0.3;
+const GROWN_STEPS: u32 = 4;
 /// A stress of more Young's moduli than this is carried over cut down to it: only a wreck has it,
 /// and there the explicit step throws things about.
 const CARRIED_STRESS_IN_E: f32 = 2.0;
@@ -61,24 +75,42 @@ const WRECKED_SHARES: [f64; 2] = [0.2, 0.01];
 /// is on its way back.
 const WRECKED_VOLUMES: [f32; 2] = [-0.05, 0.1];
 
+/// Batches a chunk, in looking how they stand: some microseconds.
+const BATCHES_PER_CHUNK: usize = 64;
+
 /// All tetrahedra of a body.
 #[derive(Clone, Debug)]
 pub struct NeoHookean {
-    tets: Colored<Batch>,
+    tets: Batches<Batch>,
     tet_count: usize,
-    /// What the stresses do to each particle [m/s²], and the place that no particle owns.
+    /// What the stresses do to each particle [m/s²], and spare places.
     accelerations: Vec<Vec4>,
-    /// The last shape that was not wrecked [m], and the place that no particle owns.
+    /// The last shape that was not wrecked [m], and spare places.
     sound: Vec<Vec4>,
     /// What the responses and shares of `tets` were made for.
     ready_for: Option<SolverParams>,
     step: Step,
+    carry: Carry,
+    /// Share of its stress that every tetrahedron carries over at most.
+    kept_by_all: f32,
     /// Whether some tetrahedron carries only a share of its stress over.
     sheds: bool,
     /// Whether some stress was too large to be carried over after the last sweep.
     overloaded: bool,
     /// Whether the body is wrecked and is led back to its last sound shape.
     restoring: bool,
+}
+
+/// How much of its stress the body as a whole carries over.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+enum Carry {
+    /// As much as its size and stiffness allow, with so many steps in a row in which waves seemed
+    /// to grow, though all was carried over.
+    #[default]
+    Most,
+    Growing(u32),
+    /// As much as is safe: waves have grown.
+    Safe,
 }
 
 /// How all tetrahedra stand.
@@ -95,7 +127,7 @@ impl NeoHookean {
     /// Tetrahedra `sound` of `mesh`, of which `fill` is the share that is tissue.
     pub fn new(mesh: &TetMesh, sound: &[u32], fill: &[f32]) -> Self {
         let corners: Vec<[u32; 4]> = sound.iter().map(|&tet| mesh.tets[tet as usize]).collect();
-        let tets = Colored::new(&corners, mesh.particles.len(), |members, corners| {
+        let tets = Batches::new(&corners, &mesh.particles, |members, corners| {
             let mut batch = Batch {
                 corners,
                 rest_inverse: Default::default(),
@@ -120,13 +152,15 @@ impl NeoHookean {
             batch
         });
         let mut rest: Vec<Vec4> = mesh.particles.iter().map(|x| x.extend(0.0)).collect();
-        rest.push(Vec4::ZERO);
+        add_spare(&mut rest);
         Self {
             tets,
             tet_count: sound.len(),
             accelerations: vec![Vec4::ZERO; rest.len()],
             sound: rest,
             ready_for: None,
+            carry: Carry::default(),
+            kept_by_all: 1.0,
             step: Step::default(),
             sheds: false,
             overloaded: false,
@@ -135,7 +169,7 @@ impl NeoHookean {
     }
 
     /// Starts a substep from the stress where the last one ended, and returns what that does to
-    /// each particle [m/s²]; the last entry is of the place that no particle owns.
+    /// each particle [m/s²]; the last entries are of spare places.
     pub fn begin_substep(
         &mut self,
         team: &Team,
@@ -147,7 +181,7 @@ impl NeoHookean {
         } else if self.sheds || self.overloaded {
             let (step, places) = (self.step, reading(particles));
             self.tets
-                .for_each_colored(team, &mut self.accelerations, |run, accelerations| {
+                .for_each_part(team, &mut self.accelerations, |run, accelerations| {
                     run_avx(run, Work::Shed, places, accelerations, places, step);
                 });
         }
@@ -165,7 +199,7 @@ impl NeoHookean {
             Work::Project
         };
         let overloaded = AtomicBool::new(false);
-        self.tets.for_each_colored(team, particles, |run, places| {
+        self.tets.for_each_part(team, particles, |run, places| {
             if run_avx(run, work, places, accelerations, sound, step) {
                 overloaded.store(true, Ordering::Relaxed);
             }
@@ -175,19 +209,27 @@ impl NeoHookean {
 
     /// Forgets all stress: the body was put somewhere else. A wrecked one is led back from there.
     pub fn forget(&mut self, particles: &mut [Vec4], params: &SolverParams) {
-        for batch in self.tets.batches_mut() {
+        for batch in self.tets.as_mut_slice() {
             batch.stress = Default::default();
         }
         self.accelerations.fill(Vec4::ZERO);
-        self.assess(particles, params);
+        (self.carry, self.ready_for) = (Carry::Most, None);
+        self.assess(&Team::alone(), particles, params);
     }
 
     /// How far stress and deformation are apart, after a step; decides whether the body is
     /// wrecked, and remembers its shape if it is not.
-    pub fn assess(&mut self, particles: &mut [Vec4], params: &SolverParams) -> Residual {
+    pub fn assess(
+        &mut self,
+        team: &Team,
+        particles: &mut [Vec4],
+        params: &SolverParams,
+    ) -> Residual {
         self.step = step_of(params);
-        let residual = self.standing(particles);
-        let share = residual.wrecked as f64 / residual.count.max(1) as f64;
+        let residual = self.standing(team, particles);
+        let count = residual.count.max(1) as f64;
+        self.watch((residual.squared_sum / count).sqrt());
+        let share = residual.wrecked as f64 / count;
         self.restoring = share > WRECKED_SHARES[usize::from(self.restoring)];
         if !self.restoring && residual.wrecked == 0 {
             self.sound.copy_from_slice(particles);
@@ -195,16 +237,35 @@ impl NeoHookean {
         residual
     }
 
+    /// Carries less over from now on if waves have been growing.
+    fn watch(&mut self, residual_rms: f64) {
+        let grows = residual_rms > GROWN_RESIDUAL && !self.restoring && self.kept_by_all >= 1.0;
+        self.carry = match self.carry {
+            Carry::Growing(steps) if grows && steps + 1 >= GROWN_STEPS => {
+                self.ready_for = None;
+                Carry::Safe
+            }
+            Carry::Growing(steps) if grows => Carry::Growing(steps + 1),
+            Carry::Most if grows => Carry::Growing(1),
+            Carry::Safe => Carry::Safe,
+            Carry::Most | Carry::Growing(_) => Carry::Most,
+        };
+    }
+
     /// Whether the body is wrecked and is led back to its last sound shape.
     pub fn is_restoring(&self) -> bool {
         self.restoring
     }
 
-    fn standing(&self, particles: &mut [Vec4]) -> Residual {
+    fn standing(&self, team: &Team, particles: &mut [Vec4]) -> Residual {
         let places = reading(particles);
         let volume_min = WRECKED_VOLUMES[usize::from(self.restoring)];
+        let chunks: Vec<&[Batch]> = self.tets.as_slice().chunks(BATCHES_PER_CHUNK).collect();
+        let standings = team.map(chunks.len(), |chunk| {
+            standing_of(chunks[chunk], places, self.step, volume_min)
+        });
         let (squared_sum_pa2, wrecked) =
-            standing_of(self.tets.batches(), places, self.step, volume_min);
+            (standings.into_iter()).fold((0.0, 0), |sum, own| (sum.0 + own.0, sum.1 + own.1));
         let young_pa = f64::from(self.step.carried_max_pa / CARRIED_STRESS_IN_E);
         Residual {
             squared_sum: squared_sum_pa2 / (young_pa * young_pa),
@@ -217,10 +278,21 @@ impl NeoHookean {
     fn make_ready(&mut self, team: &Team, particles: &mut [Vec4], params: &SolverParams) {
         let step = step_of(params);
         self.step = step;
-        self.ready_for = Some(*params);
-        let [mean_max, own_max] = CARRIED_STIFFNESS_MAX.map(|most| most * params.iterations as f32);
+        if self.ready_for.replace(*params).is_some() {
+            // Another material or time step: what was seen of the old one says nothing.
+            self.carry = Carry::Most;
+        }
+        let [mean_max, own_max] = CARRIED_STIFFNESS_MAX;
+        let mean_max = match self.carry {
+            Carry::Most | Carry::Growing(_) => {
+                mean_max * (SMALL_TETS / self.tet_count as f32).cbrt().min(1.0)
+            }
+            Carry::Safe => CARRIED_STIFFNESS_SAFE,
+        };
+        let sweeps = params.iterations as f32;
+        let [mean_max, own_max] = [sweeps * mean_max, sweeps * own_max];
         let mut stiffness_sum = 0.0;
-        for batch in self.tets.batches_mut() {
+        for batch in self.tets.as_mut_slice() {
             for lane in 0..LANES {
                 let k = f64::from(step.h2_s2 * batch.volume_m3.0[lane]);
                 let mobility = mobility(batch, lane, particles);
@@ -238,18 +310,18 @@ impl NeoHookean {
             }
         }
         let mean = (stiffness_sum / self.tet_count.max(1) as f64) as f32;
-        let kept_by_all = mean_max / mean.max(mean_max);
+        self.kept_by_all = mean_max / mean.max(mean_max);
         self.sheds = false;
-        for batch in self.tets.batches_mut() {
+        for batch in self.tets.as_mut_slice() {
             for kept in &mut batch.kept.0 {
-                *kept = kept.min(kept_by_all);
+                *kept = kept.min(self.kept_by_all);
                 self.sheds |= *kept < 1.0;
             }
         }
         self.accelerations.fill(Vec4::ZERO);
         let places = reading(particles);
         self.tets
-            .for_each_colored(team, &mut self.accelerations, |run, accelerations| {
+            .for_each_part(team, &mut self.accelerations, |run, accelerations| {
                 for batch in run {
                     batch.accelerate_anew::<false>(places, accelerations);
                 }

@@ -3,11 +3,12 @@
 use super::{
     BodySetup, SolverParams, StepReport, ToolInput,
     contact::{DEPENETRATION_SPEED_M_S, Surface},
-    diagnose::{rest_volume_m3, volume_and_inverted},
+    diagnose::rest_volume_m3,
     grab::Tissue,
     implicit::Step,
     model::Model,
     particles::Particles,
+    parts::SHARED_TETS_MIN,
     team::Team,
     tools::{Met, Tools},
 };
@@ -20,8 +21,8 @@ const CALM_SIZES: f32 = 1e-4;
 /// Calm for so long, it falls asleep [s]: longer than it hangs still at the turning point of a
 /// swing.
 const CALM_S: f32 = 0.5;
-/// A smaller body has colours too small to share.
-const SHARED_TETS_MIN: usize = 3000;
+/// Tetrahedra a chunk, in adding up volumes: some microseconds.
+const TETS_PER_CHUNK: usize = 1024;
 /// Points a task, in bringing the surface up to date.
 const POINTS_PER_TASK: usize = 4096;
 
@@ -54,6 +55,13 @@ pub struct Simulation {
     pool: Option<rayon::ThreadPool>,
 }
 
+/// How a body stands after a step.
+struct Standing {
+    residual_rms: f32,
+    volume_m3: f64,
+    inverted_tets: usize,
+}
+
 impl Simulation {
     /// A body at rest.
     ///
@@ -79,10 +87,10 @@ impl Simulation {
             .map(|&tet| rest_volume_m3(mesh, tet as usize) * f64::from(setup.fill[tet as usize]))
             .sum();
         let mass_kg: f64 = setup.masses_kg.iter().map(|&mass| f64::from(mass)).sum();
-        let rest_volume_m3 = volume_and_inverted(&mesh.particles, &sound_tets).0;
+        let particles = Particles::new(&mesh.particles, &inverse_masses(&setup));
+        let rest_volume_m3 = particles.volume_and_inverted(&sound_tets).0;
         // The edge of a regular tetrahedron of the mean volume.
         let mean_volume = rest_volume_m3 / sound.len().max(1) as f64;
-        let particles = Particles::new(&mesh.particles, &inverse_masses(&setup));
         let mut simulation = Self {
             model: Model::new(params.method, mesh, &sound, &setup.fill, &particles.places),
             particles,
@@ -225,6 +233,8 @@ impl Simulation {
                 self.particles.places[i] = position.extend(0.0);
             }
         }
+        self.model.forget(&mut self.particles.places, &self.solver);
+        self.tools.forget_sides();
         self.wake();
         self.publish();
     }
@@ -319,16 +329,43 @@ impl Simulation {
 
         self.particles.keep_finite();
         self.model.begin_step();
-        let shared = self.sound.len() >= SHARED_TETS_MIN;
-        let mut lead = |team: &Team| {
-            for substep in 0..self.solver.substeps {
-                self.substep(team, substep);
-            }
-        };
-        if shared {
-            Team::with(lead);
+        let standing = if self.sound.len() >= SHARED_TETS_MIN {
+            Team::with(|team| self.move_on(team))
         } else {
-            lead(&Team::alone());
+            self.move_on(&Team::alone())
+        };
+        let speed_max_m_s = self.particles.speed_max_m_s();
+        // By the way and not the speed: where something presses, light particles tremble.
+        let way_max_m = CALM_SIZES * self.size_m;
+        if stirred || self.particles.farthest_m(&self.calm_places) > way_max_m {
+            self.calm_places.copy_from_slice(&self.particles.places);
+            self.calm_steps = 0;
+        } else {
+            self.calm_steps += 1;
+        }
+        let surface = surface(&self.setup, &self.points, self.point_bounds);
+        self.report = StepReport {
+            residual_rms: standing.residual_rms,
+            volume_drift: (standing.volume_m3 / self.rest_volume_m3 - 1.0) as f32,
+            tool_forces_n: self.tools.forces_n(self.solver.substeps),
+            penetration_max_m: (self.tools).penetration_max_m(surface, &self.particles),
+            inverted_tets: standing.inverted_tets,
+            frozen_particles: self.frozen,
+            speed_max_m_s,
+            asleep: false,
+        };
+        if self.calm_steps >= (CALM_S / self.solver.timestep_s).round() as u32 {
+            self.particles.velocities.fill(Vec3::ZERO);
+            self.model.stand_still();
+            self.report.asleep = true;
+            self.report.speed_max_m_s = 0.0;
+        }
+    }
+
+    /// All substeps, and how the body stands after them.
+    fn move_on(&mut self, team: &Team) -> Standing {
+        for substep in 0..self.solver.substeps {
+            self.substep(team, substep);
         }
         // A wrecked body's speed comes from the wreck; it would overshoot its shape.
         let damping = if self.model.is_restoring() {
@@ -347,34 +384,17 @@ impl Simulation {
             self.model = self.new_model();
         }
 
-        let residual_rms = (self.model).residual_rms(&mut self.particles.places, &self.solver);
+        let places = &mut self.particles.places;
+        let residual_rms = self.model.residual_rms(team, places, &self.solver);
         self.publish();
-        let (volume, inverted_tets) = volume_and_inverted(&self.positions, &self.sound_tets);
-        let speed_max_m_s = self.particles.speed_max_m_s();
-        // By the way and not the speed: where something presses, light particles tremble.
-        let way_max_m = CALM_SIZES * self.size_m;
-        if stirred || self.particles.farthest_m(&self.calm_places) > way_max_m {
-            self.calm_places.copy_from_slice(&self.particles.places);
-            self.calm_steps = 0;
-        } else {
-            self.calm_steps += 1;
-        }
-        let surface = surface(&self.setup, &self.points, self.point_bounds);
-        self.report = StepReport {
+        let chunks: Vec<&[[u32; 4]]> = self.sound_tets.chunks(TETS_PER_CHUNK).collect();
+        let parts = team.map(chunks.len(), |chunk| {
+            self.particles.volume_and_inverted(chunks[chunk])
+        });
+        Standing {
             residual_rms,
-            volume_drift: (volume / self.rest_volume_m3 - 1.0) as f32,
-            tool_forces_n: self.tools.forces_n(self.solver.substeps),
-            penetration_max_m: (self.tools).penetration_max_m(surface, &self.particles),
-            inverted_tets,
-            frozen_particles: self.frozen,
-            speed_max_m_s,
-            asleep: false,
-        };
-        if self.calm_steps >= (CALM_S / self.solver.timestep_s).round() as u32 {
-            self.particles.velocities.fill(Vec3::ZERO);
-            self.model.stand_still();
-            self.report.asleep = true;
-            self.report.speed_max_m_s = 0.0;
+            volume_m3: parts.iter().map(|part| part.0).sum(),
+            inverted_tets: parts.iter().map(|part| part.1).sum(),
         }
     }
 

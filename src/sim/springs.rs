@@ -7,7 +7,7 @@
 use super::{
     Lame,
     constraint::LENGTH_MIN_M,
-    lanes::{Colored, Corner, Corners, LANES, Lanes, Lanes3, ParticleAccess},
+    lanes::{Batches, Corner, Corners, LANES, Lanes, Lanes3, ParticleAccess},
     mass_spring::edges_of,
     team::Team,
 };
@@ -42,8 +42,8 @@ struct VolumeBatch {
 /// All edges and volumes of a body.
 #[derive(Clone, Debug)]
 pub struct Springs {
-    edges: Colored<EdgeBatch>,
-    volumes: Colored<VolumeBatch>,
+    edges: Batches<EdgeBatch>,
+    volumes: Batches<VolumeBatch>,
 }
 
 /// One over modulus and h² [1/(Pa s²)], for edges and for volumes; `None` where nothing resists.
@@ -67,10 +67,9 @@ impl Compliance {
 impl Springs {
     /// Edges and volumes of the tetrahedra `sound` of `mesh`, of which `fill` is tissue.
     pub fn new(mesh: &TetMesh, sound: &[u32], fill: &[f32]) -> Self {
-        let particle_count = mesh.particles.len();
         let springs = edges_of(mesh, sound, fill);
         let corners: Vec<[u32; 2]> = springs.iter().map(|edge| edge.particles).collect();
-        let edges = Colored::new(&corners, particle_count, |members, corners| {
+        let edges = Batches::new(&corners, &mesh.particles, |members, corners| {
             let mut batch = EdgeBatch {
                 corners,
                 rest_length: Lanes::splat(1.0),
@@ -85,7 +84,7 @@ impl Springs {
             batch
         });
         let corners: Vec<[u32; 4]> = sound.iter().map(|&tet| mesh.tets[tet as usize]).collect();
-        let volumes = Colored::new(&corners, particle_count, |members, corners| {
+        let volumes = Batches::new(&corners, &mesh.particles, |members, corners| {
             let mut batch = VolumeBatch {
                 corners,
                 rest_volume: Lanes::splat(1.0),
@@ -105,10 +104,10 @@ impl Springs {
 
     /// Sets all multipliers to 0, as a substep starts.
     pub fn begin_substep(&mut self) {
-        for batch in self.edges.batches_mut() {
+        for batch in self.edges.as_mut_slice() {
             batch.lambda = Lanes::default();
         }
-        for batch in self.volumes.batches_mut() {
+        for batch in self.volumes.as_mut_slice() {
             batch.lambda = Lanes::default();
         }
     }
@@ -116,14 +115,13 @@ impl Springs {
     /// One sweep over all edges, then over all volumes.
     pub fn project(&mut self, team: &Team, particles: &mut [Vec4], lame: Lame, substep_s: f32) {
         let compliance = Compliance::new(lame, substep_s);
-        self.edges.for_each_colored(team, particles, |run, access| {
+        self.edges.for_each_part(team, particles, |run, access| {
             project_edges(run, access, compliance.edge);
         });
         if let Some(compliance) = compliance.volume {
-            self.volumes
-                .for_each_colored(team, particles, |run, access| {
-                    project_volumes(run, access, compliance);
-                });
+            self.volumes.for_each_part(team, particles, |run, access| {
+                project_volumes(run, access, compliance);
+            });
         }
     }
 
@@ -131,27 +129,28 @@ impl Springs {
     /// there are.
     pub fn residual(&self, particles: &mut [Vec4], lame: Lame, substep_s: f32) -> (f64, usize) {
         let compliance = Compliance::new(lame, substep_s);
-        let unused = particles.len() as u32 - 1;
         let access = ParticleAccess::reading(particles);
         let (mut sum, mut count) = (0.0, 0);
-        let mut add = |corner: &[u32; LANES], residual: Lanes, rest: Lanes| {
-            for lane in (0..LANES).filter(|&lane| corner[lane] != unused) {
+        // Both corners of a lane that is not used are the same spare place.
+        let mut add = |corners: [&[u32; LANES]; 2], residual: Lanes, rest: Lanes| {
+            for lane in (0..LANES).filter(|&lane| corners[0][lane] != corners[1][lane]) {
                 sum += f64::from(residual.0[lane] / rest.0[lane]).powi(2);
                 count += 1;
             }
         };
-        for batch in self.edges.batches() {
+        for batch in self.edges.as_slice() {
             let corners = [0, 1].map(|k| access.gather::<false>(&batch.corners[k]));
             let residual = edge_value(batch, &corners).0
                 + batch.geometry.times(compliance.edge) * batch.lambda;
-            add(&batch.corners[0], residual, batch.rest_length);
+            add(batch.corners.each_ref(), residual, batch.rest_length);
         }
         if let Some(compliance) = compliance.volume {
-            for batch in self.volumes.batches() {
+            for batch in self.volumes.as_slice() {
                 let corners = [0, 1, 2, 3].map(|k| access.gather::<false>(&batch.corners[k]));
                 let residual = volume_value(batch, &corners).0
                     + batch.geometry.times(compliance) * batch.lambda;
-                add(&batch.corners[0], residual, batch.rest_volume);
+                let ends = [&batch.corners[0], &batch.corners[1]];
+                add(ends, residual, batch.rest_volume);
             }
         }
         (sum, count)
@@ -269,6 +268,7 @@ fn project_volume_batch(batch: &mut VolumeBatch, access: ParticleAccess, complia
 mod tests {
     use super::*;
     use crate::sim::constraint;
+    use crate::sim::lanes::add_spare;
     use glam::Vec3;
 
     const LAME: Lame = Lame {
@@ -298,7 +298,7 @@ mod tests {
         .enumerate()
         .map(|(k, &x)| (0.01 * x).extend(1e3 * (1.0 + k as f32)))
         .collect();
-        places.push(Vec4::ZERO);
+        add_spare(&mut places);
         places
     }
 
@@ -322,7 +322,7 @@ mod tests {
             .collect();
         springs
             .volumes
-            .for_each_colored(&Team::alone(), &mut places, |run, access| {
+            .for_each_part(&Team::alone(), &mut places, |run, access| {
                 project_volumes(run, access, compliance);
             });
         for k in 0..4 {
@@ -350,7 +350,7 @@ mod tests {
         let expected = x[0] - places[0].w * c.value / (places[0].w + alpha_tilde) * c.gradient[0];
         // The edge 0–1 comes first and is the only one of its colour that can move.
         project_edges(
-            &mut springs.edges.batches_mut()[..1],
+            &mut springs.edges.as_mut_slice()[..1],
             ParticleAccess::reading(&mut places),
             compliance,
         );

@@ -1,8 +1,8 @@
-//! Threads that stay awake for the length of a step, so that a colour of a few hundred tetrahedra
-//! is worth sharing.
+//! Threads that stay awake for the length of a step, so that a job of a few hundred tetrahedra is
+//! worth sharing.
 //!
-//! A substep has some thirty colours of a few microseconds each. Waking a thread costs about as
-//! much, so rayon's own loops lose here. The helpers of a [`Team`] spin on one word for the length
+//! A substep has some jobs of a few microseconds each. Waking a thread costs about as much, so
+//! rayon's own loops lose here. The helpers of a [`Team`] spin on one word for the length
 //! of a step and claim chunks of whatever the leader has published there. The leader claims chunks
 //! too and waits for claimed ones only: with the other cores busy elsewhere it does all the work
 //! itself and loses next to nothing. Who does a chunk does not change its result.
@@ -11,12 +11,13 @@ use std::cell::UnsafeCell;
 use std::marker::PhantomData;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
-/// More helpers than this find too little to do in a colour.
+/// More helpers than this find too little to do.
 const HELPERS_MAX: usize = 7;
 /// A helper that has found nothing for so many looks lets other programs have the core.
 const PATIENCE: u32 = 4096;
 
-/// Bits of the claim word: next chunk, number of chunks, and above both the number of the job.
+/// Bits of the claim word: first and one past the last chunk that nobody has claimed, and above both
+/// the number of the job.
 const CHUNK_BITS: u32 = 20;
 const CHUNK_MASK: u64 = (1 << CHUNK_BITS) - 1;
 
@@ -25,7 +26,7 @@ type Job<'a> = &'a (dyn Fn(usize) + Sync);
 /// A leader and its helpers.
 pub struct Team {
     helpers: usize,
-    /// Number of the job, number of its chunks, next chunk.
+    /// Number of the job, one past its last free chunk, its first free chunk.
     claim: AtomicU64,
     /// Chunks of this job that are done.
     done: AtomicU32,
@@ -90,7 +91,7 @@ impl Team {
         let number = (self.claim.load(Ordering::Relaxed) >> (2 * CHUNK_BITS)) + 1;
         let published = (number << (2 * CHUNK_BITS)) | ((chunks as u64) << CHUNK_BITS);
         self.claim.store(published, Ordering::Release);
-        while self.claim_and_do() {}
+        while self.claim_and_do(End::First) {}
         while (self.done.load(Ordering::Acquire) as usize) < chunks {
             std::hint::spin_loop();
         }
@@ -114,21 +115,36 @@ impl Team {
         });
     }
 
+    /// What `job` makes of each chunk, in order.
+    pub fn map<R: Clone + Default + Send>(
+        &self,
+        chunks: usize,
+        job: impl Fn(usize) -> R + Sync,
+    ) -> Vec<R> {
+        let mut results = vec![R::default(); chunks];
+        self.for_runs(&mut results, 1, |chunk, result| result[0] = job(chunk));
+        results
+    }
+
     /// Does one chunk if there is one.
-    fn claim_and_do(&self) -> bool {
+    fn claim_and_do(&self, end: End) -> bool {
         let word = self.claim.load(Ordering::Acquire);
-        let next = word & CHUNK_MASK;
-        if next >= (word >> CHUNK_BITS) & CHUNK_MASK {
+        let (first, past) = (word & CHUNK_MASK, (word >> CHUNK_BITS) & CHUNK_MASK);
+        if first >= past {
             return false;
         }
+        let (chunk, left) = match end {
+            End::First => (first, word + 1),
+            End::Last => (past - 1, word - (1 << CHUNK_BITS)),
+        };
         let claimed =
-            (self.claim).compare_exchange(word, word + 1, Ordering::AcqRel, Ordering::Relaxed);
+            (self.claim).compare_exchange(word, left, Ordering::AcqRel, Ordering::Relaxed);
         if claimed.is_ok() {
             // Counts the chunk even if the job panics, so that the leader does not wait for ever.
             let _done = Done(&self.done);
             // SAFETY: a claimed chunk keeps the leader from writing.
             let job = unsafe { *self.job.get() }.expect("chunks are published with their job");
-            job(next as usize);
+            job(chunk as usize);
         }
         true
     }
@@ -136,7 +152,7 @@ impl Team {
     fn help(&self) {
         let mut idle = 0;
         while !self.stop.load(Ordering::Relaxed) {
-            if self.claim_and_do() {
+            if self.claim_and_do(End::Last) {
                 idle = 0;
             } else if idle < PATIENCE {
                 idle += 1;
@@ -146,6 +162,15 @@ impl Team {
             }
         }
     }
+}
+
+/// Which end of a job chunks are claimed from. The leader takes the first and helpers the last, so
+/// that from one job to the next each works in the same part of the body, on particles that are
+/// still in its core's cache.
+#[derive(Clone, Copy)]
+enum End {
+    First,
+    Last,
 }
 
 struct Stop<'a>(&'a Team);

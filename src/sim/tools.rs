@@ -134,9 +134,6 @@ impl Tools {
         for tool in &mut self.tools {
             let from_m = tool.at(from);
             tool.contacts.begin_substep(from_m, &particles.previous);
-            if let Some(grab) = &mut tool.grab {
-                grab.begin_substep();
-            }
         }
     }
 
@@ -150,12 +147,15 @@ impl Tools {
         }
     }
 
-    /// Lets tools that pressed in the last substep press on, before anything else answers.
+    /// Lets tools that pressed or pulled in the last substep go on, before anything else answers.
     pub fn press_on(&mut self, particles: &mut Particles, from: f32, to: f32, substep_s: f32) {
         let scale = self.scale(substep_s);
         for tool in &mut self.tools {
             let motion = tool.motion(from, to);
             (tool.contacts).press_on(motion, scale, &mut particles.places);
+            if let Some(grab) = &mut tool.grab {
+                grab.pull_on(scale, &mut particles.places);
+            }
         }
     }
 

@@ -52,27 +52,33 @@ impl HeldBody {
             Hold::End => x.x <= low.x + near,
             Hold::Foot => x.z <= low.z + FOOT_SHARE * (high.z - low.z),
         });
-        let is_tip = |i: &usize| match hold {
-            Hold::End => particles[*i].x >= high.x - near,
-            Hold::Foot => particles[*i].z >= high.z - near,
-        };
         let skin = skin(&tets);
-        Self {
-            tip: (0..particles.len()).filter(is_tip).collect(),
-            size_m: f64::from(size_m),
-            setup: BodySetup {
-                masses_kg: lumped_masses_kg(&tets, density_kg_m3),
-                fixed: fixed.collect(),
-                fill: Vec::new(),
-                triangles: skin.triangles,
-                embedding: Embedding {
-                    particles: skin.particles.iter().map(|&i| [i; 4]).collect(),
-                    weights: vec![[1.0, 0.0, 0.0, 0.0]; skin.particles.len()],
-                },
-                gravity_m_s2: GRAVITY_M_S2,
-                damping_per_s: 0.0,
-                tets,
+        let setup = BodySetup {
+            masses_kg: lumped_masses_kg(&tets, density_kg_m3),
+            fixed: fixed.collect(),
+            fill: Vec::new(),
+            triangles: skin.triangles,
+            embedding: Embedding {
+                particles: skin.particles.iter().map(|&i| [i; 4]).collect(),
+                weights: vec![[1.0, 0.0, 0.0, 0.0]; skin.particles.len()],
             },
+            gravity_m_s2: GRAVITY_M_S2,
+            damping_per_s: 0.0,
+            tets,
+        }
+        .numbered_along();
+        let is_tip = |x: &Vec3| match hold {
+            Hold::End => x.x >= high.x - near,
+            Hold::Foot => x.z >= high.z - near,
+        };
+        let particles = setup.tets.particles.iter().enumerate();
+        Self {
+            tip: particles
+                .filter(|(_, x)| is_tip(x))
+                .map(|(i, _)| i)
+                .collect(),
+            size_m: f64::from(size_m),
+            setup,
         }
     }
 

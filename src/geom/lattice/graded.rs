@@ -48,8 +48,9 @@ pub fn graded_block(
     let core_m = CORE_SHARE * f64::from(size_m.y);
     let out_of_range = || LatticeError::CellOutOfRange {
         cell_m,
-        // Counted: 600 (core / cell)³ tetrahedra where the box is twice as wide as high.
-        min_m: (core_m * (1000.0 / GRADED_TETS_MAX as f64).cbrt()) as f32,
+        // Counted: 600 (core / cell)³ tetrahedra where the box is twice as wide as high, and more
+        // for each octave that it is wider.
+        min_m: (core_m * (2000.0 / GRADED_TETS_MAX as f64).cbrt()) as f32,
         max_m: size_m.y,
     };
     if !(cell_m > 0.0 && cell_m <= size_m.y) {

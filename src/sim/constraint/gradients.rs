@@ -36,7 +36,6 @@ const VOLUME: (Constraint<4>, Definition<4>) = (
     },
     volume_change,
 );
-
 /// Largest difference of the gradient from central differences of the definition, over the largest
 /// gradient; `None` where the constraint has no direction.
 fn gradient_error<const N: usize>(
@@ -62,9 +61,9 @@ fn gradient_error<const N: usize>(
     Some(worst / largest)
 }
 
-/// Single precision on a tetrahedron whose rest height is a fifth of its edges: a few hundred
-/// roundings of 6e-8.
-const TOLERANCE: f64 = 2e-4;
+/// Single precision: gradients are of order 1 and sum a few products of coordinates of up to 2,
+/// each rounded by 6e-8; shares of the gradient of a tetrahedron nearly flat are more.
+const TOLERANCE: f64 = 1e-5;
 
 /// Corners of a tetrahedron of edges of about 1 that is not flat, anywhere within 1 of the origin.
 fn rest_corners() -> impl Strategy<Value = [Vec3; 4]> {
@@ -108,9 +107,9 @@ proptest! {
     #[test]
     fn gradients_of_a_constraint_add_up_to_nothing(rest in rest_corners(), moves in moves()) {
         let x = moved(rest, moves);
-        let all = [DISTANCE.0([x[0], x[1]], [rest[0], rest[1]]).map(|c| c.gradient.to_vec())];
-        let tets = [VOLUME.0(x, rest).map(|c| c.gradient.to_vec())];
-        for gradient in all.into_iter().chain(tets).flatten() {
+        let edge = DISTANCE.0([x[0], x[1]], [rest[0], rest[1]]).map(|c| c.gradient.to_vec());
+        let tet = VOLUME.0(x, rest).map(|c| c.gradient.to_vec());
+        for gradient in edge.into_iter().chain(tet) {
             let sum: Vec3 = gradient.iter().sum();
             let largest = gradient.iter().map(|g| g.length()).fold(0.0, f32::max);
             // A shift of all corners changes nothing; the sum itself rounds.
@@ -130,8 +129,16 @@ const MOVED: [Vec3; 4] = [
 
 #[test]
 fn gradient_check_rejects_another_definition() {
-    let six: Definition<4> = |x, rest| 6.0 * volume_change(x, rest);
-    let error = gradient_error((VOLUME.0, six), MOVED, REST).expect("a volume has a gradient");
+    let six_times: Definition<4> = |x, rest| 6.0 * volume_change(x, rest);
+    let error = gradient_error((VOLUME.0, six_times), MOVED, REST).expect("it has a gradient");
     // Six times too small.
     assert!((error - 5.0 / 6.0).abs() < 0.01, "{error}");
+}
+
+#[test]
+fn gradient_check_rejects_a_length_that_is_a_per_mille_off() {
+    let off: Definition<2> = |x, rest| 1.001 * x[0].distance(x[1]) - rest[0].distance(rest[1]);
+    let ends = ([MOVED[0], MOVED[1]], [REST[0], REST[1]]);
+    let error = gradient_error((DISTANCE.0, off), ends.0, ends.1).expect("the ends are apart");
+    assert!(error > 5.0 * TOLERANCE, "{error}");
 }

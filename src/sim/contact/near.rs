@@ -99,14 +99,18 @@ impl NearPoint {
 /// What of the surface touches what of the tool.
 ///
 /// A flat part of the surface under a large tool rests on its points: of a triangle only one place
-/// is held, and on that alone it would rock. Triangles come in where the tool is smaller.
+/// is held, and on that alone it would rock. Triangles come in where the tool is smaller. A capsule
+/// touches a triangle along a line, and on one place of that the triangle would rock about it: it
+/// meets the sides of the triangle, and the face with its ends only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Feature {
     /// A point of the surface and the whole axis.
     Point { point: u32 },
-    /// A triangle and one half of a capsule's axis, which may lie along a triangle larger than
-    /// itself; spheres have the first only.
-    Triangle { half: u8, triangle: u32 },
+    /// A side of triangles, from the point of the lower index to the other, and the whole axis of a
+    /// capsule.
+    Side { points: [u32; 2] },
+    /// A triangle and one end of the axis; the other end is that of a capsule.
+    Triangle { other: bool, triangle: u32 },
 }
 
 impl Feature {
@@ -115,9 +119,9 @@ impl Feature {
     pub fn axis(self, shape: ToolShape) -> Axis {
         let axis = shape.axis_m();
         match self {
-            Self::Point { .. } => [Vec3::ZERO, axis],
-            Self::Triangle { half: 0, .. } => [Vec3::ZERO, 0.5 * axis],
-            Self::Triangle { .. } => [0.5 * axis, axis],
+            Self::Point { .. } | Self::Side { .. } => [Vec3::ZERO, axis],
+            Self::Triangle { other: false, .. } => [Vec3::ZERO; 2],
+            Self::Triangle { other: true, .. } => [axis; 2],
         }
     }
 }
@@ -126,7 +130,8 @@ impl Feature {
 #[derive(Clone, Copy, Debug)]
 pub struct Near {
     pub feature: Feature,
-    /// Its corners, as indices of near points; for a point three times the same.
+    /// Its corners, as indices of near points; for a point three times the same, for a side one
+    /// twice.
     pub corners: [u32; 3],
     /// How near it may come to the axis [m].
     pub radius_m: f32,
@@ -183,17 +188,23 @@ impl Vicinity {
         self.beyond.clear();
         self.beyond
             .extend(surface.points.iter().map(|&x| swept.beyond(x)));
-        let halves = match shape {
-            ToolShape::Sphere { .. } => 1,
-            ToolShape::Capsule { .. } => 2,
-        };
-        for half in 0..halves {
-            for (index, corners) in surface.triangles.iter().enumerate() {
-                let [a, b, c] = corners.map(|point| self.beyond[point as usize]);
-                if a & b & c == 0 {
-                    let triangle = index as u32;
-                    let feature = Feature::Triangle { half, triangle };
-                    self.add(feature, *corners, shape, from_m, swept.reach_m, surface);
+        for (index, &corners) in surface.triangles.iter().enumerate() {
+            let [a, b, c] = corners.map(|point| self.beyond[point as usize]);
+            if a & b & c != 0 {
+                continue;
+            }
+            let mut add = |feature, corners| {
+                self.add(feature, corners, shape, from_m, swept.reach_m, surface);
+            };
+            let triangle = index as u32;
+            let at_end = |other| Feature::Triangle { other, triangle };
+            add(at_end(false), corners);
+            if let ToolShape::Capsule { .. } = shape {
+                add(at_end(true), corners);
+                for k in 0..3 {
+                    let (from, to) = (corners[k], corners[(k + 1) % 3]);
+                    let points = [from.min(to), from.max(to)];
+                    add(Feature::Side { points }, [points[0], points[1], points[1]]);
                 }
             }
         }
@@ -219,7 +230,7 @@ impl Vicinity {
         let dip_m = dip_m(shape.radius_m(), places);
         let off_m = match feature {
             Feature::Point { point } => self.points[self.near_of[point as usize] as usize].off_m,
-            Feature::Triangle { .. } => -dip_m,
+            Feature::Side { .. } | Feature::Triangle { .. } => -dip_m,
         };
         let radius_m = shape.radius_m() + off_m;
         let clear_m = nearest(feature.axis(shape), places).distance_m() - radius_m;
@@ -259,6 +270,8 @@ impl Vicinity {
     /// Sorts what has been added.
     fn close(&mut self) {
         self.near.sort_unstable_by_key(|near| near.feature);
+        // Two triangles have each side.
+        self.near.dedup_by_key(|near| near.feature);
         for point in &self.points {
             self.near_of[point.point as usize] = NONE;
         }

@@ -19,6 +19,11 @@
 //! Source: Smith, de Goes, Kim, "Stable Neo-Hookean Flesh Simulation", ACM TOG 37, 2018 (energy,
 //! eigenvalues). The bounds on s are derived here; a test holds them to the eigenvalues.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "one counter for several arrays of the same fixed length"
+)]
+
 #[cfg(target_arch = "x86_64")]
 use super::avx2::Avx2;
 use super::{

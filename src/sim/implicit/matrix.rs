@@ -234,10 +234,10 @@ mod tests {
                 }
             }
             matrix.mirror_upper();
-            for row in 0..9 {
+            for (row, dense) in dense.iter().enumerate() {
                 let found = matrix.product(matrix.row(row), &x).xyz().as_dvec3();
                 let expected: glam::DVec3 =
-                    (0..9).map(|column| dense[row][column] * x[column].xyz().as_dvec3()).sum();
+                    dense.iter().zip(&x).map(|(block, x)| *block * x.xyz().as_dvec3()).sum();
                 // 27 products of numbers below 2, in f32.
                 prop_assert!((found - expected).length() < 1e-5);
             }

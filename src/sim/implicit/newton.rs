@@ -225,6 +225,9 @@ impl Newton {
             return None;
         }
         let mut trial = std::mem::take(&mut self.trial);
+        // Nodes that are held have no step, but may be held elsewhere than last time.
+        let free = self.cg.solution.len();
+        trial[free..].copy_from_slice(&at[free..]);
         let mut share = 1.0;
         let mut found = None;
         for _ in 0..CUTS_MAX {

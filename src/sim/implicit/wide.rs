@@ -4,6 +4,11 @@
 //! same order, one rounding an operation, so the bits are the same. (Plain arrays alone would do if
 //! the compiler turned code of this length into vector instructions; it does so in parts only.)
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "one counter for several arrays of the same fixed length"
+)]
+
 use super::matrix::Block;
 use glam::{DVec4, Vec4};
 use std::ops::{Add, Div, Mul, Neg, Sub};

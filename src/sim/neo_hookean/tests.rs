@@ -29,7 +29,7 @@ fn eight(moves: &[f32]) -> (TetMesh, Vec<Vec4>) {
         }
         mesh.tets.push([first, first + 1, first + 2, first + 3]);
     }
-    places.push(Vec4::ZERO);
+    add_spare(&mut places);
     (mesh, places)
 }
 
@@ -183,7 +183,7 @@ fn narrow_and_wide_vectors_give_the_same_bits() {
         let step = model.step;
         let accelerations = reading(&mut model.accelerations);
         let access = reading(&mut places);
-        for batch in model.tets.batches_mut() {
+        for batch in model.tets.as_mut_slice() {
             #[cfg(target_arch = "x86_64")]
             if wide && std::arch::is_x86_feature_detected!("avx2") {
                 batch.project::<true>(access, accelerations, step);
@@ -227,4 +227,50 @@ fn what_is_carried_over_is_what_the_stresses_do() {
         // Fifty sums of single-precision increments.
         assert!((*a - *b).length() < 1e-4 * largest, "{a} {b}");
     }
+}
+
+#[test]
+fn waves_that_grow_for_four_steps_make_a_body_carry_less_until_it_is_put_elsewhere() {
+    let (mesh, mut places) = eight(&[0.0; 96]);
+    let mut model = model(&mesh);
+    model.begin_substep(&Team::alone(), &mut places, &PARAMS);
+    let grown = 2.0 * GROWN_RESIDUAL;
+    for residual in [
+        grown,
+        grown,
+        grown,
+        0.1 * GROWN_RESIDUAL,
+        grown,
+        grown,
+        grown,
+    ] {
+        model.watch(residual);
+        assert_ne!(model.carry, Carry::Safe);
+    }
+    model.watch(grown);
+    assert_eq!(model.carry, Carry::Safe);
+    // Calm or not: what was seen once comes again.
+    model.watch(0.0);
+    model.begin_substep(&Team::alone(), &mut places, &PARAMS);
+    assert_eq!(model.carry, Carry::Safe);
+    model.forget(&mut places, &PARAMS);
+    assert_eq!(model.carry, Carry::Most);
+}
+
+#[test]
+fn another_time_step_forgets_that_waves_grew() {
+    let (mesh, mut places) = eight(&[0.0; 96]);
+    let mut model = model(&mesh);
+    model.begin_substep(&Team::alone(), &mut places, &PARAMS);
+    for _ in 0..GROWN_STEPS {
+        model.watch(2.0 * GROWN_RESIDUAL);
+    }
+    model.begin_substep(&Team::alone(), &mut places, &PARAMS);
+    assert_eq!(model.carry, Carry::Safe);
+    let half = SolverParams {
+        substeps: 2,
+        ..PARAMS
+    };
+    model.begin_substep(&Team::alone(), &mut places, &half);
+    assert_eq!(model.carry, Carry::Most);
 }

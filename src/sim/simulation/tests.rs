@@ -10,6 +10,7 @@ mod sleep;
 use super::*;
 use crate::geom::SurfaceMesh;
 use crate::geom::lattice::{Lattice, block, sphere};
+use crate::sim::parts::SHARED_TETS_MIN;
 use crate::sim::{Method, ToolAction, ToolShape, diagnose};
 use proptest::prelude::*;
 
@@ -326,40 +327,13 @@ fn fast_poke_does_not_tunnel() {
 #[test]
 fn tool_that_appears_inside_the_body_does_not_fling_it_away() {
     let mut simulation = Simulation::new(slab(), soft(Method::XpbdNeoHookean));
-    let mut fastest = 0.0_f32;
     for step in 0..60 {
         let ball = tool(0.015, Vec3::new(0.04, 0.025, 0.04), ToolAction::Push);
         let speed = simulation.step(&[ball]).speed_max_m_s;
-        // The surface leaves at half a metre a second. Single particles below it are squeezed out
-        // faster, 5.2 m/s for one step; then the body must be calm.
-        assert!(speed < 8.0, "{speed} m/s in step {step}");
-        if step > 0 {
-            fastest = fastest.max(speed);
-        }
+        // It comes in at half a metre a second; particles beside it go 0.6 m/s.
+        assert!(speed < 1.0, "{speed} m/s in step {step}");
     }
-    assert!(fastest < 2.0, "{fastest} m/s");
     assert!(all_finite(&simulation));
-}
-
-#[test]
-fn body_resting_on_a_tool_presses_on_it_with_its_weight() {
-    let mut setup = body(Vec3::new(0.06, 0.03, 0.06), 0.01, |_| false);
-    setup.gravity_m_s2 = DOWN;
-    setup.damping_per_s = 20.0;
-    let weight: f32 = setup.masses_kg.iter().sum::<f32>() * 9.81;
-    let mut simulation = Simulation::new(setup, soft(Method::XpbdNeoHookean));
-    let table = tool(0.5, Vec3::new(0.03, -0.5, 0.03), ToolAction::Push);
-    let mut force = Vec3::ZERO;
-    for step in 0..150 {
-        let report = simulation.step(&[table]);
-        if step >= 120 {
-            force += report.tool_forces_n[0] / 30.0;
-        }
-    }
-    assert!(
-        (force.y / -weight - 1.0).abs() < 0.1,
-        "{force} for a weight of {weight} N"
-    );
 }
 
 #[test]
@@ -527,15 +501,48 @@ fn crushed_body_recovers_its_shape() {
     }
 }
 
+#[test]
+fn numbering_along_the_longest_side_changes_the_numbers_alone() {
+    let before = body(Vec3::new(0.25, 0.06, 0.06), 0.0085, |x| x.y < 1e-6);
+    let after = before.clone().numbered_along();
+    assert!(after.tets.particles.is_sorted_by(|a, b| a.x <= b.x));
+    assert!(!before.tets.particles.is_sorted_by(|a, b| a.x <= b.x));
+    let corners = |setup: &BodySetup| -> Vec<_> {
+        let of = |i: u32| {
+            (
+                setup.tets.particles[i as usize],
+                setup.masses_kg[i as usize],
+            )
+        };
+        let tets = setup.tets.tets.iter().chain(&setup.embedding.particles);
+        tets.map(|tet| tet.map(of)).collect()
+    };
+    assert_eq!(corners(&after), corners(&before));
+    let held = |setup: &BodySetup| {
+        let of = (setup.tets.particles.iter().zip(&setup.fixed)).filter(|(_, held)| **held);
+        of.fold((Vec3::ZERO, 0), |(sum, count), (x, _)| {
+            (sum + *x, count + 1)
+        })
+    };
+    let (sums, counts) = (
+        held(&before).0 - held(&after).0,
+        (held(&before).1, held(&after).1),
+    );
+    assert_eq!(counts.0, counts.1);
+    // Sums of a thousand places of 0.25 m, in another order.
+    assert!(sums.length() < 1e-3, "{sums}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(6))]
     #[test]
     fn bits_do_not_depend_on_the_number_of_threads(
         x in 0.05_f32..0.2, z in 0.05_f32..0.2, slide in -0.01_f32..0.01, method in 0..Method::ALL.len(),
     ) {
-        // Large enough that colours are shared out: see `lanes::BATCHES_PER_TASK`.
+        // Large enough for several parts.
         let run = |threads: usize| {
             let setup = body(Vec3::new(0.25, 0.06, 0.25), 0.0085, |x| x.y < 1e-6);
+            assert!(setup.tets.tets.len() >= SHARED_TETS_MIN);
             let mut simulation = Simulation::new(setup, soft(Method::ALL[method]));
             simulation.set_threads(Some(threads));
             let mut forces = Vec::new();

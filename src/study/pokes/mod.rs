@@ -1,6 +1,7 @@
 //! The study `pokes`: thousands of scripted pokes on the bundled organs, from slow to faster than any
 //! hand, each at a random place. Nothing may be torn, left inside out or run through.
 
+mod depth;
 mod script;
 mod show;
 

@@ -4,6 +4,7 @@ use super::super::random::Random;
 use super::super::sweep::{Cost, Row, State, Verdict, finite};
 use super::super::timing::{Clock, Times};
 use super::Cell;
+use super::depth::depth_m;
 use crate::app::{AppError, LoadedBody};
 use crate::geom::ray::first_hit;
 use crate::measure::chart::number;
@@ -43,11 +44,11 @@ pub struct Measures {
     pub not_finite: u32,
     /// Pokes after which tetrahedra stay inverted.
     pub lasting_inversions: u32,
-    /// Pokes in which the middle of the tool ended up inside the surface.
+    /// Pokes in which the middle of the tool was inside the surface after any frame.
     pub tunnelled: u32,
-    /// Pokes in which a surface point was deeper in the tool than 1 % of the thickness.
+    /// Pokes in which the tool reached deeper into the surface than 1 % of the thickness.
     pub too_deep: u32,
-    /// Deepest surface point inside the tool, as a share of the thickness.
+    /// Deepest that the tool reached into the surface, as a share of the thickness.
     pub penetration_share_max: Option<f64>,
     /// Inverted at any time, and at the end.
     pub inverted_tets_max: usize,
@@ -102,7 +103,7 @@ pub fn run(
         measures.not_finite += u32::from(report.frozen_particles > frozen_before);
         measures.lasting_inversions += u32::from(report.inverted_tets > 0);
         measures.tunnelled += u32::from(watched.tunnelled);
-        let share = f64::from(watched.penetration_m / poke.thickness_m);
+        let share = watched.penetration_m / f64::from(poke.thickness_m);
         measures.too_deep += u32::from(share > PENETRATION_BOUNDS[0]);
         let deepest = measures.penetration_share_max.unwrap_or(0.0).max(share);
         measures.penetration_share_max = finite(deepest);
@@ -140,7 +141,7 @@ fn seed(cell: &Cell) -> u64 {
 /// What happened during one poke.
 #[derive(Clone, Copy, Debug, Default)]
 struct Watched {
-    penetration_m: f32,
+    penetration_m: f64,
     force_max_n: f32,
     inverted_tets_max: usize,
     tunnelled: bool,
@@ -167,7 +168,12 @@ fn poke_once(
         let clock = Clock::start();
         let report = simulation.step(&[tool]);
         times.add(clock);
-        watched.penetration_m = watched.penetration_m.max(report.penetration_max_m);
+        if action == ToolAction::Push {
+            let (middle, points) = (tool.position_m, simulation.points());
+            let depth_m = depth_m(middle, poke.radius_m, points, places.triangles);
+            watched.penetration_m = watched.penetration_m.max(depth_m);
+            watched.tunnelled |= depth_m > f64::from(poke.radius_m);
+        }
         watched.force_max_n = watched.force_max_n.max(report.tool_forces_n[0].length());
         watched.inverted_tets_max = watched.inverted_tets_max.max(report.inverted_tets);
     };
@@ -184,8 +190,6 @@ fn poke_once(
     for _ in 0..HOLD_FRAMES {
         step(simulation, poke.way_m, ToolAction::Push);
     }
-    let middle = poke.from_m + poke.way_m * poke.direction;
-    let tunnelled = places.is_inside(simulation.points(), middle);
     for k in 1..=steps(poke.way_m, back_m) {
         step(
             simulation,
@@ -196,7 +200,6 @@ fn poke_once(
     for _ in 0..AFTER_FRAMES {
         step(simulation, 0.0, ToolAction::Idle);
     }
-    watched.tunnelled = tunnelled;
     watched
 }
 
@@ -251,38 +254,16 @@ impl<'a> Places<'a> {
         let inside = touch + 1e-3 * self.extent_m * direction;
         let thickness_m = first_hit(inside, direction, &self.points, self.triangles)?.distance;
         let from_m = touch - (1.0 + GAP_RADII) * radius_m * direction;
-        let depth_m = (depth_share * thickness_m).min(DEPTH_EXTENT_MAX * self.extent_m);
-        let is_clear = self
-            .points
-            .iter()
-            .all(|point| point.distance(from_m) > radius_m);
+        let in_tissue_m = (depth_share * thickness_m).min(DEPTH_EXTENT_MAX * self.extent_m);
+        let is_clear = depth_m(from_m, radius_m, &self.points, self.triangles) < 0.0;
         let is_thick = thickness_m > THICKNESS_SHARE_MIN * self.extent_m;
         (is_clear && is_thick).then_some(Poke {
             radius_m,
             from_m,
             direction,
-            way_m: GAP_RADII * radius_m + depth_m,
+            way_m: GAP_RADII * radius_m + in_tissue_m,
             thickness_m,
         })
-    }
-
-    /// Whether `place` is inside the surface through `points`, by a vote of three directions.
-    fn is_inside(&self, points: &[Vec3], place: Vec3) -> bool {
-        let leaves = |direction: &Vec3| {
-            let hit = first_hit(place, *direction, points, self.triangles);
-            hit.is_some_and(|hit| hit.normal.dot(*direction) > 0.0)
-        };
-        // No direction along which a surface is likely to be aligned.
-        let directions = [
-            Vec3::new(0.61, 0.37, 0.70),
-            Vec3::new(-0.53, 0.81, -0.23),
-            Vec3::new(0.17, -0.44, 0.88),
-        ];
-        directions
-            .iter()
-            .filter(|direction| leaves(direction))
-            .count()
-            >= 2
     }
 }
 
@@ -295,7 +276,7 @@ fn verdict(m: &Measures) -> Verdict {
     };
     count(m.not_finite, "not finite");
     count(m.lasting_inversions, "left tetrahedra inverted");
-    count(m.tunnelled, "ended with the tool inside");
+    count(m.tunnelled, "with the middle of the tool inside");
     let share = m.penetration_share_max.unwrap_or(f64::INFINITY);
     if share > PENETRATION_BOUNDS[0] {
         let state = if share > PENETRATION_BOUNDS[1] {
@@ -331,9 +312,10 @@ mod tests {
         let mut random = Random::new(7);
         for _ in 0..20 {
             let poke = places.choose(&mut random).expect("a slab can be poked");
-            assert!(!places.is_inside(&places.points, poke.from_m));
+            let depth = |x: Vec3| depth_m(x, 0.0, &places.points, places.triangles);
+            assert!(depth(poke.from_m) < -f64::from(poke.radius_m));
             let front = poke.from_m + (poke.way_m + poke.radius_m) * poke.direction;
-            assert!(places.is_inside(&places.points, front), "{poke:?}");
+            assert!(depth(front) > 0.0, "{poke:?}");
             assert!((poke.direction.length() - 1.0).abs() < 1e-5);
         }
     }

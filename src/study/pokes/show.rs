@@ -23,9 +23,9 @@ pub fn findings(rows: &[PokesRow]) -> Findings {
             Block::Paragraph(lead(rows)),
             Block::Chart {
                 svg,
-                caption: "Deepest surface point inside the tool over all pokes of a speed, as a share of the \
+                caption: "Deepest that the tool reached into the surface over all pokes of a speed, as a share of the \
                           thickness under the tool. The goal is 1 %. Crosses at the top: speeds at which a \
-                          poke was not finite, left tetrahedra inverted, or ended with the tool inside."
+                          poke was not finite, left tetrahedra inverted, or had the middle of the tool inside."
                     .to_owned(),
             },
             Block::Table(table(&groups)),
@@ -92,8 +92,8 @@ fn lead(rows: &[PokesRow]) -> String {
         .filter(|row| row.verdict.state == State::Failed)
         .count();
     format!(
-        "{pokes} pokes in {} simulations: {} not finite, {} left tetrahedra inverted, {} ended with the tool \
-         inside, {} went deeper into the tool than 1 % of the thickness. {failed} simulations failed.",
+        "{pokes} pokes in {} simulations: {} not finite, {} left tetrahedra inverted, {} had the middle of \
+         the tool inside, {} reached deeper into the surface than 1 % of the thickness. {failed} simulations failed.",
         rows.len(),
         sum(&|m| m.not_finite),
         sum(&|m| m.lasting_inversions),
@@ -128,7 +128,7 @@ fn chart(groups: &[Group]) -> ScatterChart {
     });
     ScatterChart {
         size_px: CHART_PX,
-        title: "Depth of tissue inside the tool".to_owned(),
+        title: "Depth of the tool in the tissue".to_owned(),
         x_label: "speed of the tool [m/s]".to_owned(),
         y_label: "share of the thickness [%]".to_owned(),
         x_range: (low / 1.5, high * 1.5),
