@@ -87,6 +87,6 @@ pub fn bundled(path: &Path) -> Option<&'static [u8]> {
 pub fn read(path: &Path) -> std::io::Result<Cow<'static, [u8]>> {
     match bundled(path) {
         Some(bytes) => Ok(Cow::Borrowed(bytes)),
-        None => std::fs::read(path).map(Cow::Owned),
+        None => crate::geom::import::read_file(path).map(Cow::Owned),
     }
 }

@@ -257,8 +257,8 @@ impl Recording {
         }
         if summary.inverted_tets.last > 0 {
             eprintln!(
-                "{} tetrahedra end inverted, so the body is wrecked: use more substeps, or the method \
-                 xpbd-neo-hookean",
+                "{} tetrahedra end inverted, so the body is wrecked: use more substeps, a stiffer \
+                 material, or the method implicit",
                 summary.inverted_tets.last
             );
         }

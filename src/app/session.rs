@@ -215,6 +215,13 @@ fn solver_notes(scene: &Scene, simulation: &Simulation) -> Vec<String> {
             ));
         }
     }
+    if let Some(substeps) = simulation.faithful_substeps() {
+        notes.push(format!(
+            "tissue of {:.0} Pa is too stiff for {} substeps on this mesh and will yield and sag too \
+             far: use {substeps} substeps, or the method implicit",
+            scene.solver.youngs_modulus_pa, scene.solver.substeps
+        ));
+    }
     let setup = simulation.setup();
     if !setup.fixed.contains(&true) {
         notes.push("nothing holds the body: body.fixed reaches no particle of it".to_owned());

@@ -265,8 +265,10 @@ pub struct ToolInput {
 /// What a step did.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StepReport {
-    /// RMS over all constraints of C + α̃λ after the last substep. Constraints are made free of
-    /// units by their rest length or volume; 0 for a method without constraints.
+    /// What is left of the equations after the last substep, free of units: RMS of C + α̃λ over the
+    /// rest length or volume for `xpbd-springs`, of the misfit of stress and deformation over
+    /// Young's modulus for `xpbd-neo-hookean`, residual over load for `implicit`; 0 for
+    /// `mass-spring`.
     pub residual_rms: f32,
     /// (volume − rest volume) / rest volume, over all tetrahedra.
     pub volume_drift: f32,

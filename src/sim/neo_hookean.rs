@@ -71,6 +71,9 @@ const CARRIED_STRESS_IN_E: f32 = 2.0;
 /// A body is wrecked once more than this share of its tetrahedra is, and on its way back until
 /// less than the second share is.
 const WRECKED_SHARES: [f64; 2] = [0.2, 0.01];
+/// A body that so many steps have not led back is held in its state by something, a tool or a load,
+/// and left to its own material again.
+const LED_STEPS_MAX: u32 = 120;
 /// Volume over rest volume below which a tetrahedron is wrecked, in a sound body and in one that
 /// is on its way back.
 const WRECKED_VOLUMES: [f32; 2] = [-0.05, 0.1];
@@ -99,6 +102,8 @@ pub struct NeoHookean {
     overloaded: bool,
     /// Whether the body is wrecked and is led back to its last sound shape.
     restoring: bool,
+    /// Steps since it was wrecked.
+    led_steps: u32,
 }
 
 /// How much of its stress the body as a whole carries over.
@@ -165,6 +170,7 @@ impl NeoHookean {
             sheds: false,
             overloaded: false,
             restoring: false,
+            led_steps: 0,
         }
     }
 
@@ -207,6 +213,36 @@ impl NeoHookean {
         self.overloaded = overloaded.into_inner();
     }
 
+    /// Substeps that it takes for the body to carry all its stress over: with fewer it sags too far.
+    /// `None` if those of `params` do.
+    pub fn faithful_substeps(&self, particles: &[Vec4], params: &SolverParams) -> Option<u32> {
+        let excess = self.mean_stiffness(particles, params) / self.mean_max(params);
+        let wanted = f64::from(params.substeps) * f64::from(excess).sqrt();
+        (excess > 1.0).then(|| wanted.ceil().min(f64::from(u32::MAX)) as u32)
+    }
+
+    /// Mean of κ over all tetrahedra.
+    fn mean_stiffness(&self, particles: &[Vec4], params: &SolverParams) -> f32 {
+        let step = step_of(params);
+        let batches = self.tets.as_slice().iter();
+        let sum: f64 = batches
+            .map(|batch| stiffnesses(batch, particles, step).iter().sum::<f64>())
+            .sum();
+        (sum / self.tet_count.max(1) as f64) as f32
+    }
+
+    /// The largest such mean at which all stress is carried over.
+    fn mean_max(&self, params: &SolverParams) -> f32 {
+        let a_sweep = match self.carry {
+            Carry::Most | Carry::Growing(_) => {
+                let size = (SMALL_TETS / self.tet_count.max(1) as f32).cbrt();
+                CARRIED_STIFFNESS_MAX[0] * size.min(1.0)
+            }
+            Carry::Safe => CARRIED_STIFFNESS_SAFE,
+        };
+        a_sweep * params.iterations as f32
+    }
+
     /// Forgets all stress: the body was put somewhere else. A wrecked one is led back from there.
     pub fn forget(&mut self, particles: &mut [Vec4], params: &SolverParams) {
         for batch in self.tets.as_mut_slice() {
@@ -230,7 +266,9 @@ impl NeoHookean {
         let count = residual.count.max(1) as f64;
         self.watch((residual.squared_sum / count).sqrt());
         let share = residual.wrecked as f64 / count;
-        self.restoring = share > WRECKED_SHARES[usize::from(self.restoring)];
+        let wrecked = share > WRECKED_SHARES[usize::from(self.led_steps > 0)];
+        self.led_steps = if wrecked { self.led_steps + 1 } else { 0 };
+        self.restoring = wrecked && self.led_steps <= LED_STEPS_MAX;
         if !self.restoring && residual.wrecked == 0 {
             self.sound.copy_from_slice(particles);
         }
@@ -282,17 +320,13 @@ impl NeoHookean {
             // Another material or time step: what was seen of the old one says nothing.
             self.carry = Carry::Most;
         }
-        let [mean_max, own_max] = CARRIED_STIFFNESS_MAX;
-        let mean_max = match self.carry {
-            Carry::Most | Carry::Growing(_) => {
-                mean_max * (SMALL_TETS / self.tet_count as f32).cbrt().min(1.0)
-            }
-            Carry::Safe => CARRIED_STIFFNESS_SAFE,
-        };
-        let sweeps = params.iterations as f32;
-        let [mean_max, own_max] = [sweeps * mean_max, sweeps * own_max];
-        let mut stiffness_sum = 0.0;
+        let own_max = CARRIED_STIFFNESS_MAX[1] * params.iterations as f32;
+        let (mean, mean_max) = (
+            self.mean_stiffness(particles, params),
+            self.mean_max(params),
+        );
         for batch in self.tets.as_mut_slice() {
+            let stiffness = stiffnesses(batch, particles, step);
             for lane in 0..LANES {
                 let k = f64::from(step.h2_s2 * batch.volume_m3.0[lane]);
                 let mobility = mobility(batch, lane, particles);
@@ -303,13 +337,9 @@ impl NeoHookean {
                 for (entry, value) in entries.iter().enumerate() {
                     batch.response[entry].0[lane] = *value as f32;
                 }
-                let trace = mobility.x_axis.x + mobility.y_axis.y + mobility.z_axis.z;
-                let stiffness = k * trace * f64::from(step.bulk_pa + step.mu_pa);
-                stiffness_sum += stiffness;
-                batch.kept.0[lane] = own_max / (stiffness as f32).max(own_max);
+                batch.kept.0[lane] = own_max / (stiffness[lane] as f32).max(own_max);
             }
         }
-        let mean = (stiffness_sum / self.tet_count.max(1) as f64) as f32;
         self.kept_by_all = mean_max / mean.max(mean_max);
         self.sheds = false;
         for batch in self.tets.as_mut_slice() {
@@ -327,6 +357,16 @@ impl NeoHookean {
                 }
             });
     }
+}
+
+/// κ of each tetrahedron, 0 where a lane is not used.
+fn stiffnesses(batch: &Batch, particles: &[Vec4], step: Step) -> [f64; LANES] {
+    std::array::from_fn(|lane| {
+        let k = f64::from(step.h2_s2 * batch.volume_m3.0[lane]);
+        let mobility = mobility(batch, lane, particles);
+        let trace = mobility.x_axis.x + mobility.y_axis.y + mobility.z_axis.z;
+        k * trace * f64::from(step.bulk_pa + step.mu_pa)
+    })
 }
 
 /// S = Σ w g gᵀ of one tetrahedron [1/(kg m²)].

@@ -296,6 +296,17 @@ impl Simulation {
         Model::new(self.solver.method, mesh, &self.sound, fill, places)
     }
 
+    /// Substeps from which on `xpbd-neo-hookean` bears this body as stiffly as it is; `None` if those
+    /// it has are enough, and for the other methods, which have no such limit.
+    pub fn faithful_substeps(&self) -> Option<u32> {
+        match &self.model {
+            Model::NeoHookean(model) => {
+                model.faithful_substeps(&self.particles.places, &self.solver)
+            }
+            Model::MassSpring(_) | Model::Springs(_) | Model::Implicit(_) => None,
+        }
+    }
+
     fn wake(&mut self) {
         self.calm_steps = 0;
         self.report.asleep = false;

@@ -84,17 +84,19 @@ impl Team {
         }
         assert!((chunks as u64) < CHUNK_MASK, "a job has fewer chunks");
         let job: Job = &job;
-        // SAFETY: the job outlives its use: this function returns after its last call. No chunk is
-        // claimed now, so nobody reads.
+        // SAFETY: the job outlives its use: `Finish` waits for its last call, whichever way this
+        // function is left. No chunk is claimed now, so nobody reads.
         unsafe { *self.job.get() = Some(std::mem::transmute::<Job, Job<'static>>(job)) };
         self.done.store(0, Ordering::Relaxed);
         let number = (self.claim.load(Ordering::Relaxed) >> (2 * CHUNK_BITS)) + 1;
         let published = (number << (2 * CHUNK_BITS)) | ((chunks as u64) << CHUNK_BITS);
         self.claim.store(published, Ordering::Release);
+        // Also if a chunk of the leader panics: helpers must be done with the job before it goes.
+        let _finish = Finish {
+            team: self,
+            chunks: chunks as u32,
+        };
         while self.claim_and_do(End::First) {}
-        while (self.done.load(Ordering::Acquire) as usize) < chunks {
-            std::hint::spin_loop();
-        }
     }
 
     /// Calls `job` for runs of `values` of at most `length`, with the number of the first.
@@ -171,6 +173,29 @@ impl Team {
 enum End {
     First,
     Last,
+}
+
+/// Takes back the chunks that nobody has claimed and waits for the others.
+struct Finish<'a> {
+    team: &'a Team,
+    chunks: u32,
+}
+
+impl Drop for Finish<'_> {
+    fn drop(&mut self) {
+        let withdraw = |word: u64| {
+            let past = (word >> CHUNK_BITS) & CHUNK_MASK;
+            Some((word & !CHUNK_MASK) | past)
+        };
+        let claim = &self.team.claim;
+        let before = claim.fetch_update(Ordering::AcqRel, Ordering::Acquire, withdraw);
+        let word = before.unwrap_or_else(|word| word);
+        let (first, past) = (word & CHUNK_MASK, (word >> CHUNK_BITS) & CHUNK_MASK);
+        let claimed = self.chunks - past.saturating_sub(first) as u32;
+        while self.team.done.load(Ordering::Acquire) < claimed {
+            std::hint::spin_loop();
+        }
+    }
 }
 
 struct Stop<'a>(&'a Team);

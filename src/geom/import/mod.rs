@@ -25,7 +25,7 @@ mod weld;
 
 pub use describe::describe;
 pub use error::{ImportError, ImportFault};
-pub use part::{FileParts, Part, TextureSource, read_parts};
+pub use part::{FileParts, Part, TextureSource, read_file, read_parts};
 pub use picture::{read_picture, read_picture_bytes};
 pub use surface::{ImportOptions, ImportedSurface, read_surface, read_surface_bytes};
 pub use tets::{ImportedTets, read_tets, read_tets_bytes};

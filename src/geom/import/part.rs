@@ -108,24 +108,36 @@ pub(super) fn parts_of(path: &Path, bytes: &[u8]) -> Result<FileParts, ImportFau
 }
 
 /// The bytes of an ordinary file of bearable size.
-pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, ImportFault> {
-    let failed = |source| ImportFault::Io {
-        needed: path.to_owned(),
-        source,
-    };
-    let about = std::fs::metadata(path).map_err(failed)?;
+///
+/// # Errors
+///
+/// What the system says, or why this file is not read.
+pub fn read_file(path: &Path) -> std::io::Result<Vec<u8>> {
+    let about = std::fs::metadata(path)?;
     if !about.is_file() {
-        return Err(failed(std::io::Error::other("not an ordinary file")));
+        return Err(std::io::Error::other("not an ordinary file"));
     }
     if about.len() > FILE_BYTES_MAX {
-        return Err(ImportFault::TooLarge {
-            what: format!(
-                "{} bytes are over the limit of {FILE_BYTES_MAX}",
-                about.len()
-            ),
-        });
+        let bytes = about.len();
+        let what = format!("{bytes} bytes are over the limit of {FILE_BYTES_MAX}");
+        return Err(std::io::Error::new(std::io::ErrorKind::FileTooLarge, what));
     }
-    std::fs::read(path).map_err(failed)
+    std::fs::read(path)
+}
+
+/// The same, with an error that names the file.
+pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, ImportFault> {
+    read_file(path).map_err(|source| {
+        if source.kind() == std::io::ErrorKind::FileTooLarge {
+            return ImportFault::TooLarge {
+                what: source.to_string(),
+            };
+        }
+        ImportFault::Io {
+            needed: path.to_owned(),
+            source,
+        }
+    })
 }
 
 fn check_positions(part: &Part) -> Result<(), ImportFault> {

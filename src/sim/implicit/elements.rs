@@ -1,4 +1,5 @@
-//! All tetrahedra of a body, in strips that may be worked on together.
+//! All tetrahedra of a body, in strips: every other one shares no node. One thread works on them, as
+//! on all of the implicit method; the strips fix the order of its sums.
 
 use super::{
     element::{self, Batch, Element, Moduli, Strain},

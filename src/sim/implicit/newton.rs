@@ -33,6 +33,11 @@ const CUTS_MAX: usize = 10;
 const FALL_SHARE: f64 = 1e-4;
 /// Changes of the energy below this share of it may be rounding.
 const ENERGY_ROUNDING: f64 = 1e-6;
+/// Shares of the nodes' own stiffness that are added to a matrix, one after the other, where no step
+/// is found without.
+const LIFTS: [f32; 3] = [0.03, 0.3, 3.0];
+/// Nearer to rest than this many times its residual, a step that is not found is not missed.
+const LIFTED_ABOVE: f64 = 100.0;
 /// With the sweeps alone CG converges well while the stiffness of a node is below so many times
 /// its inertia.
 const SWEEPS_SUFFICE: f64 = 5.0;
@@ -143,12 +148,30 @@ impl Newton {
                 iterations_max: CG_ITERATIONS_MAX,
             };
             self.solve(stop, self.is_stiff(goal));
-            match self.step_along(at, &state, goal, lame) {
+            let mut found = self.step_along(at, &state, goal, lame);
+            // Many crushed tetrahedra together can leave a matrix that is not positive.
+            for lift in LIFTS {
+                if found.is_some() || state.residual_n <= LIFTED_ABOVE * rest_n {
+                    break;
+                }
+                self.lift(lift);
+                self.lattices_are_fresh = false;
+                self.solve(stop, self.is_stiff(goal));
+                found = self.step_along(at, &state, goal, lame);
+            }
+            match found {
                 Some(next) => state = next,
                 None => break,
             }
         }
         state
+    }
+
+    /// Adds a share of each free node's own stiffness to the diagonal.
+    fn lift(&mut self, share: f32) {
+        for (node, &stiffness) in self.body_stiffness.iter().enumerate() {
+            self.matrix.add_to_diagonal(node, share * stiffness);
+        }
     }
 
     /// Solves matrix times step = residual. With `lattices`, those of an earlier matrix of this

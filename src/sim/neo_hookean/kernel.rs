@@ -41,9 +41,10 @@ pub const OWN_RESPONSE: f32 = 0.85;
 /// What is added to the stress, over what acts at once (see `neo_hookean`).
 const STRESS_LEAD: f32 = 1.2;
 
-/// A tetrahedron whose ‖F‖² (3 at rest) is outside of these is crushed or torn long.
+/// A tetrahedron whose ‖F‖² (3 at rest) is outside of these is crushed or torn long: pulled to five
+/// times its length along all axes, which no load that tissue bears comes near.
 const SQUARED_MIN: f32 = 1.0;
-const SQUARED_MAX: f32 = 12.0;
+const SQUARED_MAX: f32 = 75.0;
 
 /// Deformation gradient, its cofactor and its determinant.
 struct Deformation {

@@ -274,3 +274,25 @@ fn another_time_step_forgets_that_waves_grew() {
     model.begin_substep(&Team::alone(), &mut places, &half);
     assert_eq!(model.carry, Carry::Most);
 }
+
+#[test]
+fn a_body_says_how_many_substeps_it_takes_to_carry_all_its_stress() {
+    let (mesh, places) = eight(&[0.0; 96]);
+    let model = model(&mesh);
+    assert_eq!(model.faithful_substeps(&places, &PARAMS), None);
+    let stiff = SolverParams {
+        youngs_modulus_pa: 1e4 * PARAMS.youngs_modulus_pa,
+        ..PARAMS
+    };
+    let substeps = model.faithful_substeps(&places, &stiff);
+    let wanted = SolverParams {
+        substeps: substeps.expect("ten thousand times as stiff is too stiff"),
+        ..stiff
+    };
+    assert_eq!(model.faithful_substeps(&places, &wanted), None);
+    let fewer = SolverParams {
+        substeps: wanted.substeps - 1,
+        ..stiff
+    };
+    assert!(model.faithful_substeps(&places, &fewer).is_some());
+}

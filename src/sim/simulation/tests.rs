@@ -559,3 +559,31 @@ proptest! {
         prop_assert!(one == run(3), "three threads differ from one");
     }
 }
+
+#[test]
+fn a_soft_body_that_hangs_to_twice_its_length_is_no_wreck() {
+    // Far beyond what tissue does, and still the shape that its energy has its minimum at.
+    let mut setup = body(Vec3::new(0.02, 0.02, 0.06), 0.01, |x| x.z > 0.0599);
+    setup.gravity_m_s2 = Vec3::new(0.0, 0.0, -9.81);
+    setup.damping_per_s = 10.0;
+    let ends = |method| {
+        let params = SolverParams {
+            youngs_modulus_pa: 250.0,
+            poisson_ratio: 0.45,
+            ..soft(method)
+        };
+        let mut simulation = Simulation::new(setup.clone(), params);
+        for _ in 0..300 {
+            simulation.step(&[]);
+        }
+        assert_eq!(simulation.report().inverted_tets, 0, "{method:?}");
+        let lowest = simulation.particles().iter().map(|x| x.z);
+        lowest.fold(f32::INFINITY, f32::min)
+    };
+    let (default, implicit) = (ends(Method::XpbdNeoHookean), ends(Method::Implicit));
+    assert!(implicit < -0.06, "it hangs {implicit} m low");
+    assert!(
+        (default / implicit - 1.0).abs() < 0.01,
+        "{default} against {implicit}"
+    );
+}
