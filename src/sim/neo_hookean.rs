@@ -213,12 +213,13 @@ impl NeoHookean {
         self.overloaded = overloaded.into_inner();
     }
 
-    /// Substeps that it takes for the body to carry all its stress over: with fewer it sags too far.
-    /// `None` if those of `params` do.
+    /// Substeps with which the body is safe to carry all its stress over, if with those of `params` it
+    /// can't and sags too far.
     pub fn faithful_substeps(&self, particles: &[Vec4], params: &SolverParams) -> Option<u32> {
-        let excess = self.mean_stiffness(particles, params) / self.mean_max(params);
-        let wanted = f64::from(params.substeps) * f64::from(excess).sqrt();
-        (excess > 1.0).then(|| wanted.ceil().min(f64::from(u32::MAX)) as u32)
+        let mean = self.mean_stiffness(particles, params);
+        let safe = CARRIED_STIFFNESS_SAFE * params.iterations as f32;
+        let wanted = f64::from(params.substeps) * f64::from(mean / safe).sqrt();
+        (mean > self.mean_max(params)).then(|| wanted.ceil().min(f64::from(u32::MAX)) as u32)
     }
 
     /// Mean of κ over all tetrahedra.
