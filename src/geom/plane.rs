@@ -7,6 +7,7 @@
 //! planes) and eq. 14, whose unsigned offset loses the side; ours keeps it.
 
 use super::patch::Patches;
+use super::sample::{Sample, Samples};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -25,14 +26,20 @@ pub enum LightPathMethod {
     Full,
     /// Planes fitted anew where something moved.
     Incremental,
+    /// Planes fitted to sixteen weighted samples of each patch, where something moved.
+    Sampled,
+    /// Paraboloids through each point, fitted to the same samples, where something moved.
+    Quadric,
 }
 
 impl LightPathMethod {
     /// Every method, cheapest first.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 7] = [
         Self::Tangent,
         Self::Stale,
         Self::Carried,
+        Self::Sampled,
+        Self::Quadric,
         Self::Incremental,
         Self::Full,
     ];
@@ -45,6 +52,8 @@ impl LightPathMethod {
             Self::Carried => "carried",
             Self::Full => "full",
             Self::Incremental => "incremental",
+            Self::Sampled => "sampled",
+            Self::Quadric => "quadric",
         }
     }
 }
@@ -189,6 +198,38 @@ pub fn fit_plane(members: impl Iterator<Item = Vec3>, at: Vec3, normal: Vec3) ->
     plane_of_moments(mean, spread, normal)
 }
 
+/// Least-squares plane through the weighted `samples` of a patch, seen from the point `at` [m] with unit
+/// normal `normal`.
+///
+/// The tangent plane where the samples have no thinnest direction: fewer than three, at one place, on one
+/// line. Twin of `shaders/plane_sampled.wgsl`.
+pub fn fit_sampled_plane(samples: &[Sample], points: &[Vec3], at: Vec3, normal: Vec3) -> Plane {
+    let mut mean = Vec3::ZERO;
+    let mut squares = Vec3::ZERO;
+    let mut products = Vec3::ZERO;
+    for sample in samples {
+        let d = points[sample.point as usize] - at;
+        mean += sample.weight * d;
+        squares += sample.weight * d * d;
+        products += sample.weight * Vec3::new(d.x * d.y, d.x * d.z, d.y * d.z);
+    }
+    let spread = Spread {
+        squares: squares - mean * mean,
+        products: products - Vec3::new(mean.x * mean.y, mean.x * mean.z, mean.y * mean.z),
+    };
+    plane_of_moments(mean, spread, normal)
+}
+
+/// [`fit_sampled_plane`] for every point.
+pub fn fit_sampled_planes(points: &[Vec3], normals: &[Vec3], samples: &Samples) -> Vec<Plane> {
+    let mut planes: Vec<Plane> = normals.iter().map(|&n| Plane::tangent(n)).collect();
+    for (own, &point) in samples.of_slot.iter().zip(&samples.order) {
+        let point = point as usize;
+        planes[point] = fit_sampled_plane(own, points, points[point], normals[point]);
+    }
+    planes
+}
+
 /// [`fit_plane`] for the patch of every point.
 pub fn fit_planes(points: &[Vec3], normals: &[Vec3], patches: &Patches) -> Vec<Plane> {
     (0..points.len())
@@ -233,15 +274,24 @@ pub fn exact_plane(
     at: DVec3,
     normal: DVec3,
 ) -> Option<(DVec3, f64)> {
-    let count = members.clone().count();
-    if count < 3 {
+    exact_weighted_plane(members.map(|member| (member, 1.0)), at, normal)
+}
+
+/// As [`exact_plane`], with a weight for each member.
+pub fn exact_weighted_plane(
+    members: impl Iterator<Item = (DVec3, f64)> + Clone,
+    at: DVec3,
+    normal: DVec3,
+) -> Option<(DVec3, f64)> {
+    if members.clone().count() < 3 {
         return None;
     }
-    let mean = members.clone().sum::<DVec3>() / count as f64;
+    let total: f64 = members.clone().map(|(_, weight)| weight).sum();
+    let mean = members.clone().map(|(m, weight)| weight * m).sum::<DVec3>() / total;
     let mut spread = nalgebra::Matrix3::<f64>::zeros();
-    for member in members {
+    for (member, weight) in members {
         let d = nalgebra::Vector3::from((member - mean).to_array());
-        spread += d * d.transpose();
+        spread += d * d.transpose() * weight;
     }
     let eigen = spread.symmetric_eigen();
     let column = eigen.eigenvectors.column(eigen.eigenvalues.imin());

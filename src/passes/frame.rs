@@ -9,6 +9,8 @@ use super::mesh_buffers::MeshBuffers;
 use super::plane_carried::PlaneCarried;
 use super::plane_full::PlaneFull;
 use super::plane_incremental::PlaneIncremental;
+use super::plane_sampled::PlaneSampled;
+use super::quadric::Quadrics;
 use super::shadow::Shadow;
 use super::surface::{Surface, SurfaceInputs};
 use super::tangents::Tangents;
@@ -57,6 +59,12 @@ impl FramePlan {
                 2,
                 method == Some(LightPathMethod::Incremental),
             ),
+            (
+                PlaneSampled::NAME,
+                2,
+                method == Some(LightPathMethod::Sampled),
+            ),
+            (Quadrics::NAME, 2, method == Some(LightPathMethod::Quadric)),
             (Shadow::NAME, 1, shadow),
             (LightMap::NAME, 1, gooey),
             (LightMap::BLUR_NAME, blurs, gooey && blurs > 0),
@@ -220,7 +228,7 @@ impl FramePasses {
             &frame,
             &mesh,
             &tangents,
-            light_path.planes(),
+            light_path.primitives(),
         )?;
         let targets = GeometryTargets::new(gpu, scene.surface.kind, size);
         let surface = Surface::new(

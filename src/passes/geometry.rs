@@ -5,6 +5,7 @@
 //! the model reads what it left, once a pixel.
 
 use super::draw::{DepthUse, Draw, DrawKind, Target, cleared_depth, kept};
+use super::light_path::Primitives;
 use super::mesh_buffers::MeshBuffers;
 use super::tangents::Tangents;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join};
@@ -17,7 +18,7 @@ const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 pub struct GeometryTargets {
     /// Texture coordinate, normal, tangent.
     pub base: Target,
-    /// Light-path plane, gradients of the texture coordinate; a texel where the model needs neither.
+    /// Light-path primitive, gradients of the texture coordinate; a texel where the model needs neither.
     pub detail: Target,
     /// Depth, 0 near to 1 far.
     pub depth: Target,
@@ -72,7 +73,7 @@ impl Geometry {
     /// The WGSL files of this pass, joined in this order.
     pub const WGSL: &'static [Wgsl] = crate::wgsl!["frame.wgsl", "pack.wgsl", "geometry.wgsl"];
 
-    /// Builds the pass for a model of `kind`; without `planes` the tangent plane is written for them.
+    /// Builds the pass for a model of `kind`; without primitives the tangent plane is written for them.
     ///
     /// # Errors
     ///
@@ -83,7 +84,7 @@ impl Geometry {
         frame: &wgpu::Buffer,
         mesh: &MeshBuffers,
         tangents: &Tangents,
-        planes: Option<&wgpu::Buffer>,
+        primitives: Primitives<'_>,
     ) -> Result<Self, GpuError> {
         // Only what lies below the surface is looked for with planes and gradients.
         let has_detail = kind != SurfaceKind::Plain;
@@ -91,6 +92,11 @@ impl Geometry {
             ("detail_fragment", &[FORMAT; 2])
         } else {
             ("base_fragment", &[FORMAT])
+        };
+        let primitive = match primitives {
+            Primitives::Tangent => 0.0,
+            Primitives::Planes(_) => 1.0,
+            Primitives::Quadrics(_) => 2.0,
         };
         let draw = Draw::new(
             gpu,
@@ -104,14 +110,14 @@ impl Geometry {
                 blend: None,
                 depth: DepthUse::Nearest,
                 cull: Some(wgpu::Face::Back),
-                constants: &[("HAS_PLANES", f64::from(u8::from(planes.is_some())))],
+                constants: &[("PRIMITIVE", primitive)],
             },
             &[
                 Binding::Uniform(frame),
                 Binding::Read(&mesh.positions),
                 Binding::Read(&tangents.normals),
-                // Bound but never read where there are no planes.
-                Binding::Read(planes.unwrap_or(&tangents.normals)),
+                // Bound but never read where there are none.
+                Binding::Read(primitives.buffer().unwrap_or(&tangents.normals)),
             ],
         )?;
         Ok(Self { draw, has_detail })

@@ -3,11 +3,15 @@
 use super::mesh_buffers::MeshBuffers;
 use super::plane_carried::PlaneCarried;
 use super::plane_full::PlaneFull;
+use super::moved_leaves::SampledPatches;
 use super::plane_incremental::PlaneIncremental;
+use super::plane_sampled::PlaneSampled;
+use super::quadric::Quadrics;
 use super::tangents::Tangents;
 use crate::geom::SurfaceMesh;
 use crate::geom::patch::Patches;
 use crate::geom::plane::{LightPathMethod, Plane, fit_planes};
+use crate::geom::sample::Samples;
 use crate::geom::tangent::{Fans, rest_normals};
 use crate::gpu::{Gpu, GpuError, Timer, storage};
 
@@ -32,13 +36,38 @@ pub enum LightPath {
     Full(PlaneFull),
     /// The planes near moved points anew.
     Incremental(PlaneIncremental),
+    /// The same from sixteen samples each.
+    Sampled(PlaneSampled),
+    /// Paraboloids from the same samples.
+    Quadric(Quadrics),
+}
+
+/// What the shaders read of a light path.
+#[derive(Clone, Copy, Debug)]
+pub enum Primitives<'a> {
+    /// Nothing: the tangent plane is meant.
+    Tangent,
+    /// Unit normal and signed offset [m] of each point's plane, `[vec4f; points]`.
+    Planes(&'a wgpu::Buffer),
+    /// The matrix of each point's paraboloid [1/m], `[[vec4f; 2]; points]`.
+    Quadrics(&'a wgpu::Buffer),
+}
+
+impl<'a> Primitives<'a> {
+    /// The buffer, if there is one.
+    pub fn buffer(self) -> Option<&'a wgpu::Buffer> {
+        match self {
+            Self::Tangent => None,
+            Self::Planes(buffer) | Self::Quadrics(buffer) => Some(buffer),
+        }
+    }
 }
 
 impl LightPath {
     /// Builds what `method` needs and nothing else.
     ///
     /// `radius_m` is the reach of a patch at rest; a point counts as moved when it lies farther than
-    /// `tolerance_m` from where its patches last saw it (only `incremental` asks).
+    /// `tolerance_m` from where its patches last saw it (only methods that pass over what is still ask).
     ///
     /// # Errors
     ///
@@ -81,6 +110,29 @@ impl LightPath {
                 buffers,
                 tangents,
             )?),
+            LightPathMethod::Sampled | LightPathMethod::Quadric => {
+                let samples = Samples::new(&mesh.points, &patches);
+                let dependents = samples.dependents(&mesh.point_triangles());
+                let sampled = |samples| SampledPatches {
+                    samples,
+                    dependents: &dependents,
+                    radius_m,
+                    tolerance_m,
+                };
+                let points = &mesh.points;
+                if method == LightPathMethod::Sampled {
+                    let patches = sampled(&samples);
+                    Self::Sampled(PlaneSampled::new(
+                        gpu, points, &normals, &patches, buffers, tangents,
+                    )?)
+                } else {
+                    let samples = samples.weighted_to_the_middle(points);
+                    let patches = sampled(&samples);
+                    Self::Quadric(Quadrics::new(
+                        gpu, points, &normals, &patches, buffers, tangents,
+                    )?)
+                }
+            }
         })
     }
 
@@ -91,18 +143,29 @@ impl LightPath {
             Self::Carried(pass) => pass.record(encoder, timer),
             Self::Full(pass) => pass.record(encoder, timer),
             Self::Incremental(pass) => pass.record(encoder, timer),
+            Self::Sampled(pass) => pass.record(encoder, timer),
+            Self::Quadric(pass) => pass.record(encoder, timer),
         }
     }
 
-    /// Unit normal and signed offset [m] of each point's plane, `[vec4f; points]`; `None` where the
-    /// tangent plane is meant.
-    pub fn planes(&self) -> Option<&wgpu::Buffer> {
+    /// What the shaders read.
+    pub fn primitives(&self) -> Primitives<'_> {
         match self {
-            Self::Tangent => None,
-            Self::Stale(planes) => Some(planes),
-            Self::Carried(pass) => Some(&pass.planes),
-            Self::Full(pass) => Some(&pass.planes),
-            Self::Incremental(pass) => Some(&pass.planes),
+            Self::Tangent => Primitives::Tangent,
+            Self::Stale(planes) => Primitives::Planes(planes),
+            Self::Carried(pass) => Primitives::Planes(&pass.planes),
+            Self::Full(pass) => Primitives::Planes(&pass.planes),
+            Self::Incremental(pass) => Primitives::Planes(&pass.planes),
+            Self::Sampled(pass) => Primitives::Planes(&pass.planes),
+            Self::Quadric(pass) => Primitives::Quadrics(&pass.quadrics),
+        }
+    }
+
+    /// Unit normal and signed offset [m] of each point's plane, `[vec4f; points]`; `None` where there are none.
+    pub fn planes(&self) -> Option<&wgpu::Buffer> {
+        match self.primitives() {
+            Primitives::Planes(planes) => Some(planes),
+            Primitives::Tangent | Primitives::Quadrics(_) => None,
         }
     }
 
@@ -113,11 +176,13 @@ impl LightPath {
             Self::Carried(_) => &[PlaneCarried::NAME],
             Self::Full(_) => &[PlaneFull::NAME],
             Self::Incremental(_) => &[PlaneIncremental::NAME],
+            Self::Sampled(_) => &[PlaneSampled::NAME],
+            Self::Quadric(_) => &[Quadrics::NAME],
         }
     }
 
-    /// What the last submitted frame fitted, waited for. Only `incremental` has to ask the GPU;
-    /// `full` fits all points and looks at none.
+    /// What the last submitted frame fitted, waited for. Only methods that pass over what is still have to ask
+    /// the GPU; `full` fits all points and looks at none.
     ///
     /// # Errors
     ///
@@ -130,6 +195,8 @@ impl LightPath {
                 moved: pass.point_count,
             }),
             Self::Incremental(pass) => pass.counts(gpu),
+            Self::Sampled(pass) => pass.leaves.counts(gpu),
+            Self::Quadric(pass) => pass.leaves.counts(gpu),
         }
     }
 }

@@ -1,0 +1,40 @@
+// Least-squares plane of sixteen weighted samples of a patch, about its point.
+//
+//   m = sum_k w_k d_k,  C = sum_k w_k d_k d_k^T - m m^T,  sum_k w_k = 1     then as plane_fit.wgsl
+//
+// The weights are chosen at rest so that the samples have the moments of all members (src/geom/sample.rs).
+//
+// Source:  François et al., "Subsurface Texture Mapping" (2006), section 4, for the plane; the samples are those
+//          of Gonzalez, "Clustering to Minimize the Maximum Intercluster Distance" (1985), farthest first.
+// Twin:    src/geom/plane.rs, fn fit_sampled_plane
+// Parity:  tests/light_parity.rs, fn sampled_planes_match_the_cpu_twin
+// Threads: one per slot of a listed leaf; each gathers its samples in their order.
+// Units:   metres; the result is a unit normal and an offset in metres.
+// Fails:   as plane_fit.wgsl; and what bends between the samples goes unseen.
+
+@group(0) @binding(8) var<storage, read_write> planes: array<vec4f>;
+
+@compute @workgroup_size(32)
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local: vec3u) {
+    let leaf = listed[group.x];
+    let slot = 32u * leaf + local.x;
+    if slot >= params.slot_count {
+        return;
+    }
+    let point = order[slot];
+    let at = textureLoad(positions, entry(point), 0).xyz;
+    commit(leaf, slot, point, at);
+    var mean = vec3f(0.0);
+    var squares = vec3f(0.0);
+    var products = vec3f(0.0);
+    for (var k = 0u; k < SAMPLES; k += 1u) {
+        let sample = textureLoad(samples, entry(SAMPLES * slot + k), 0).xy;
+        let d = textureLoad(positions, entry(sample.x), 0).xyz - at;
+        let weighted = bitcast<f32>(sample.y) * d;
+        mean += weighted;
+        squares += weighted * d;
+        products += weighted.xxy * d.yzz;
+    }
+    let spread = Spread(squares - mean * mean, products - mean.xxy * mean.yzz);
+    planes[point] = plane_of_moments(mean, spread, normals[point].xyz);
+}

@@ -1,0 +1,85 @@
+// Least-squares paraboloid of sixteen weighted samples of a patch, through its point and its tangent plane.
+//
+//   z = 1/2 (a u^2 + 2 b u v + c v^2),   min sum_k w_k (z(u_k, v_k) - z_k)^2 + ridge
+//   Q = a uu^T + b (uv^T + vu^T) + c vv^T        kept in world axes: no frame that vertices would have to share
+//
+// Samples whose normal is turned away lie on another sheet and are passed over.
+//
+// Source:  do Carmo, "Differential Geometry of Curves and Surfaces" (1976), 3.3 (the osculating paraboloid);
+//          Golub and Van Loan, "Matrix Computations", 4.1 (LDL^T).
+// Twin:    src/geom/quadric.rs, fn fit_quadric
+// Parity:  tests/light_parity.rs, fn quadrics_match_the_cpu_twin
+// Threads: one per slot of a listed leaf; each gathers its samples in their order.
+// Units:   metres; Q in 1/m.
+// Fails:   fewer than three points, or points at one place: zero, the tangent plane. Along one line only the
+//          bend along it is told.
+
+const RIDGE: f32 = 1e-4;
+const MIN_TRACE: f32 = 1e-12;
+const POINTS_MIN: u32 = 3u;
+
+// xx, yy, zz, 0 and xy, xz, yz, 0 of each point
+@group(0) @binding(8) var<storage, read_write> quadrics: array<array<vec4f, 2>>;
+
+// Solves a positive definite system by LDL^T; `beside` holds the entries 01, 02, 12.
+fn solve(diagonal: vec3f, beside: vec3f, right: vec3f) -> vec3f {
+    let l10 = beside.x / diagonal.x;
+    let l20 = beside.y / diagonal.x;
+    let d1 = diagonal.y - l10 * beside.x;
+    let e = beside.z - l20 * beside.x;
+    let l21 = e / d1;
+    let d2 = diagonal.z - l20 * beside.y - l21 * e;
+    let y1 = right.y - l10 * right.x;
+    let y2 = right.z - l20 * right.x - l21 * y1;
+    let z = y2 / d2;
+    let y = y1 / d1 - l21 * z;
+    return vec3f(right.x / diagonal.x - l10 * y - l20 * z, y, z);
+}
+
+@compute @workgroup_size(32)
+fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local: vec3u) {
+    let leaf = listed[group.x];
+    let slot = 32u * leaf + local.x;
+    if slot >= params.slot_count {
+        return;
+    }
+    let point = order[slot];
+    let at = textureLoad(positions, entry(point), 0).xyz;
+    commit(leaf, slot, point, at);
+    let normal = normals[point].xyz;
+    let u_axis = any_perpendicular(normal);
+    let v_axis = cross(normal, u_axis);
+    var count = 0u;
+    var diagonal = vec3f(0.0);
+    var beside = vec3f(0.0);
+    var right = vec3f(0.0);
+    for (var k = 0u; k < SAMPLES; k += 1u) {
+        let sample = textureLoad(samples, entry(SAMPLES * slot + k), 0).xy;
+        let weight = bitcast<f32>(sample.y);
+        let counts = weight > 0.0 && dot(normals[sample.x].xyz, normal) > 0.0;
+        count += select(0u, 1u, counts);
+        let d = (textureLoad(positions, entry(sample.x), 0).xyz - at) * params.per_m;
+        let u = dot(d, u_axis);
+        let v = dot(d, v_axis);
+        let basis = vec3f(0.5 * u * u, u * v, 0.5 * v * v);
+        let weighted = select(0.0, weight, counts) * basis;
+        diagonal += weighted * basis;
+        beside += weighted.xxy * basis.yzz;
+        right += dot(d, normal) * weighted;
+    }
+    let trace = diagonal.x + diagonal.y + diagonal.z;
+    if count < POINTS_MIN || !(trace > MIN_TRACE) {
+        quadrics[point][0] = vec4f(0.0);
+        quadrics[point][1] = vec4f(0.0);
+        return;
+    }
+    let bends = params.per_m * solve(diagonal + RIDGE * trace, beside, right);
+    let uu = bends.x * u_axis;
+    let uv = bends.y * u_axis;
+    let vv = bends.z * v_axis;
+    let squares = uu * u_axis + 2.0 * uv * v_axis + vv * v_axis;
+    let mixed = uv.xxy * v_axis.yzz + uv.yzz * v_axis.xxy;
+    let products = uu.xxy * u_axis.yzz + mixed + vv.xxy * v_axis.yzz;
+    quadrics[point][0] = vec4f(squares, 0.0);
+    quadrics[point][1] = vec4f(products, 0.0);
+}
