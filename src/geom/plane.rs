@@ -30,11 +30,13 @@ pub enum LightPathMethod {
     Sampled,
     /// Paraboloids through each point, fitted to the same samples, where something moved.
     Quadric,
+    /// Nothing is fitted: where light enters is read from a depth map of each light.
+    DepthMap,
 }
 
 impl LightPathMethod {
     /// Every method, cheapest first.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Tangent,
         Self::Stale,
         Self::Carried,
@@ -42,6 +44,7 @@ impl LightPathMethod {
         Self::Quadric,
         Self::Incremental,
         Self::Full,
+        Self::DepthMap,
     ];
 
     /// As scene files and charts call it.
@@ -54,6 +57,7 @@ impl LightPathMethod {
             Self::Incremental => "incremental",
             Self::Sampled => "sampled",
             Self::Quadric => "quadric",
+            Self::DepthMap => "depth-map",
         }
     }
 }

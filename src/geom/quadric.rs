@@ -36,7 +36,9 @@ impl Quadric {
         let products = |p: Vec3, q: Vec3| Vec3::new(p.x * q.y, p.x * q.z, p.y * q.z);
         Self {
             squares: a * u * u + 2.0 * b * u * v + c * v * v,
-            products: a * products(u, u) + b * (products(u, v) + products(v, u)) + c * products(v, v),
+            products: a * products(u, u)
+                + b * (products(u, v) + products(v, u))
+                + c * products(v, v),
         }
     }
 
@@ -48,12 +50,19 @@ impl Quadric {
 
     /// (a, b, c) along the unit vectors `u` and `v`.
     pub fn in_frame(&self, u: Vec3, v: Vec3) -> [f32; 3] {
-        [u.dot(self.times(u)), u.dot(self.times(v)), v.dot(self.times(v))]
+        [
+            u.dot(self.times(u)),
+            u.dot(self.times(v)),
+            v.dot(self.times(v)),
+        ]
     }
 
     /// As the shaders read it: two vectors.
     pub fn to_arrays(self) -> [[f32; 4]; 2] {
-        [self.squares.extend(0.0).to_array(), self.products.extend(0.0).to_array()]
+        [
+            self.squares.extend(0.0).to_array(),
+            self.products.extend(0.0).to_array(),
+        ]
     }
 }
 
@@ -88,8 +97,8 @@ pub fn fit_quadric(
         let (u, v, z) = (d.dot(u_axis), d.dot(v_axis), d.dot(normal));
         let basis = Vec3::new(0.5 * u * u, u * v, 0.5 * v * v);
         diagonal += sample.weight * basis * basis;
-        beside += sample.weight
-            * Vec3::new(basis.x * basis.y, basis.x * basis.z, basis.y * basis.z);
+        beside +=
+            sample.weight * Vec3::new(basis.x * basis.y, basis.x * basis.z, basis.y * basis.z);
         right += sample.weight * z * basis;
     }
     let trace = diagonal.x + diagonal.y + diagonal.z;
@@ -176,7 +185,10 @@ mod tests {
                 Vec3::new(x, height(x, z), z)
             })
             .collect();
-        let samples = (0..16).map(|point| Sample { point, weight: 1.0 / 16.0 });
+        let samples = (0..16).map(|point| Sample {
+            point,
+            weight: 1.0 / 16.0,
+        });
         (samples.collect(), places)
     }
 

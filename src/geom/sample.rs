@@ -45,7 +45,11 @@ impl Samples {
     ///
     /// If `patches` are not those of `points`.
     pub fn new(points: &[Vec3], patches: &Patches) -> Self {
-        assert_eq!(points.len(), patches.order.len(), "the patches of the points");
+        assert_eq!(
+            points.len(),
+            patches.order.len(),
+            "the patches of the points"
+        );
         let of_slot = patches
             .order
             .par_iter()
@@ -237,7 +241,12 @@ pub struct FoundLeaves {
 impl MovedLeaves {
     /// Of the surface at rest. A fit lags by no more than `tolerance_m`: half of it when it was made, and
     /// half since.
-    pub fn new(points: &[Vec3], samples: &Samples, dependents: Vec<Vec<u32>>, tolerance_m: f32) -> Self {
+    pub fn new(
+        points: &[Vec3],
+        samples: &Samples,
+        dependents: Vec<Vec<u32>>,
+        tolerance_m: f32,
+    ) -> Self {
         Self {
             committed: samples.order.iter().map(|&p| points[p as usize]).collect(),
             dependents,
@@ -444,7 +453,10 @@ mod tests {
         let (_, patches, samples) = sampled(&mesh, 0.012);
         let dependents = samples.dependents(&mesh.point_triangles());
         let mut moved = MovedLeaves::new(&mesh.points, &samples, dependents, 1e-5);
-        assert_eq!(moved.find(&mesh.points, &samples.order), FoundLeaves::default());
+        assert_eq!(
+            moved.find(&mesh.points, &samples.order),
+            FoundLeaves::default()
+        );
         for point in [0, 100, 200] {
             let mut points = mesh.points.clone();
             points[point] *= 1.1;

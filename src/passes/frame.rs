@@ -1,5 +1,6 @@
 //! The passes of a scene, and one frame of them in order.
 
+use super::depth_maps::DepthMaps;
 use super::draw::Target;
 use super::geometry::{Geometry, GeometryTargets};
 use super::light_path::{LightPath, RefitCounts};
@@ -44,6 +45,7 @@ impl FramePlan {
         let kind = scene.surface.kind;
         let method = effective_method(scene);
         let shadow = scene.lights.iter().any(|light| light.shadow);
+        let by_depth = method == Some(LightPathMethod::DepthMap);
         let gooey = kind == SurfaceKind::Gooey;
         let blurs = scene.surface.blur_passes;
         let all = [
@@ -65,7 +67,8 @@ impl FramePlan {
                 method == Some(LightPathMethod::Sampled),
             ),
             (Quadrics::NAME, 2, method == Some(LightPathMethod::Quadric)),
-            (Shadow::NAME, 1, shadow),
+            (DepthMaps::NAME, scene.lights.len() as u32, by_depth),
+            (Shadow::NAME, 1, shadow && !by_depth),
             (LightMap::NAME, 1, gooey),
             (LightMap::BLUR_NAME, blurs, gooey && blurs > 0),
             (Geometry::NAME, 1, true),
@@ -127,6 +130,7 @@ pub struct FramePasses {
     /// What is shown.
     pub picture: Target,
     shadow: Option<Shadow>,
+    depth_maps: Option<DepthMaps>,
     light_map: Option<LightMap>,
     geometry: Geometry,
     surface: Surface,
@@ -141,6 +145,19 @@ pub struct FramePasses {
     uv_per_m: f32,
     map_size_px: u32,
     size: [u32; 2],
+}
+
+/// The map that says where light 0 enters the body.
+fn shadow_map<'a>(
+    shadow: Option<&'a Shadow>,
+    depth_maps: Option<&'a DepthMaps>,
+    none: &'a Target,
+) -> &'a Target {
+    let of_all = depth_maps.map(|maps| &maps.depth);
+    shadow
+        .map(|shadow| &shadow.target)
+        .or(of_all)
+        .unwrap_or(none)
 }
 
 /// Radius of the patches of a scene [m]: told, or from the densest layer's extinction.
@@ -187,7 +204,13 @@ impl FramePasses {
             &tangents,
         )?;
         let lights = placed_lights(scene, rest);
-        let shadow = if lights.iter().any(|light| light.shadow) {
+        // Depth maps hold the shadow map too.
+        let depth_maps = if matches!(light_path, LightPath::DepthMap) {
+            Some(DepthMaps::new(gpu, surface_mesh, lights.len(), &tangents)?)
+        } else {
+            None
+        };
+        let shadow = if depth_maps.is_none() && lights.iter().any(|light| light.shadow) {
             Some(Shadow::new(gpu, surface_mesh)?)
         } else {
             None
@@ -207,7 +230,7 @@ impl FramePasses {
         let constants = light_constants(&lights);
         let maps = Maps::new(gpu, tissue);
         let no_shadow = Target::new(gpu, "no shadow", [1; 2], DEPTH_FORMAT);
-        let shadow_map = shadow.as_ref().map_or(&no_shadow, |shadow| &shadow.target);
+        let shadow_map = shadow_map(shadow.as_ref(), depth_maps.as_ref(), &no_shadow);
         let light_map = if scene.surface.kind == SurfaceKind::Gooey {
             Some(LightMap::new(
                 gpu,
@@ -224,8 +247,9 @@ impl FramePasses {
         };
         let geometry = Geometry::new(
             gpu,
-            scene.surface.kind,
+            &scene.surface,
             &frame,
+            surface_mesh,
             &mesh,
             &tangents,
             light_path.primitives(),
@@ -237,10 +261,12 @@ impl FramePasses {
             &SurfaceInputs {
                 frame: &frame,
                 light_constants: &constants,
+                cover: light_path.primitives().cover(),
                 geometry: &targets,
                 maps: &maps,
                 light_map: light_map.as_ref().map_or(&maps.outer, LightMap::view),
                 shadow_map: &shadow_map.view,
+                depth_maps: depth_maps.as_ref(),
             },
         )?;
         let radiance = Target::new(gpu, "radiance", size, RADIANCE_FORMAT);
@@ -254,6 +280,7 @@ impl FramePasses {
             radiance,
             targets,
             shadow,
+            depth_maps,
             light_map,
             geometry,
             surface,
@@ -282,12 +309,14 @@ impl FramePasses {
         self.radiance = Target::new(gpu, "radiance", size, RADIANCE_FORMAT);
         self.picture = Target::new(gpu, "picture", size, PICTURE_FORMAT);
         self.targets = GeometryTargets::new(gpu, self.knobs.kind, size);
-        let shadow_map = self.shadow.as_ref().map_or(&self.no_shadow, |s| &s.target);
+        let depth_maps = self.depth_maps.as_ref();
+        let shadow_map = shadow_map(self.shadow.as_ref(), depth_maps, &self.no_shadow);
         self.surface.rebind(
             gpu,
             &SurfaceInputs {
                 frame: &self.frame,
                 light_constants: &light_constants(&self.lights),
+                cover: self.light_path.primitives().cover(),
                 geometry: &self.targets,
                 maps: &self.maps,
                 light_map: self
@@ -295,6 +324,7 @@ impl FramePasses {
                     .as_ref()
                     .map_or(&self.maps.outer, LightMap::view),
                 shadow_map: &shadow_map.view,
+                depth_maps,
             },
         );
         self.tone_map = ToneMap::new(gpu, &self.radiance, &self.targets.depth)?;
@@ -317,8 +347,8 @@ impl FramePasses {
         encoder: &mut wgpu::CommandEncoder,
         timer: &mut Timer,
     ) {
-        let shadow_from_world = match (&self.shadow, self.lights.first()) {
-            (Some(_), Some(light)) => shadow_from_world(light.place, points),
+        let shadow_from_world = match self.lights.first() {
+            Some(light) if light.shadow => shadow_from_world(light.place, points),
             _ => Mat4::IDENTITY,
         };
         let frame = FrameUniform::new(
@@ -340,6 +370,10 @@ impl FramePasses {
         // Where the first light is cut off.
         if let Some(shadow) = &self.shadow {
             shadow.record(gpu, shadow_from_world, &self.mesh, encoder, timer);
+        }
+        // Where each light enters.
+        if let Some(maps) = &self.depth_maps {
+            maps.record(gpu, &self.lights, points, &self.mesh, encoder, timer);
         }
         // Irradiance in texture space, blurred; only the gooey surface reads it.
         if let Some(light_map) = &self.light_map {
@@ -433,6 +467,24 @@ mod tests {
                 "tangents", "lightmap", "blur", "geometry", "gooey", "tonemap"
             ]
         );
+        let by_depth = |shadow: &str| {
+            plan(&format!(
+                "shadow = {shadow}\n[light_path]\nmethod = \"depth-map\"\n[surface]\nkind = \"subsurface\""
+            ))
+        };
+        for shadow in ["false", "true"] {
+            assert_eq!(
+                names(&by_depth(shadow)),
+                [
+                    "tangents",
+                    "depth-maps",
+                    "geometry",
+                    "subsurface",
+                    "tonemap"
+                ],
+                "one map serves both"
+            );
+        }
         assert_eq!(gooey.count_of("blur"), 3);
         assert_eq!(gooey.count_of("planes-full"), 0);
     }

@@ -1,9 +1,9 @@
 //! The light-path primitive of the scene: one of a closed set of methods.
 
 use super::mesh_buffers::MeshBuffers;
+use super::moved_leaves::SampledPatches;
 use super::plane_carried::PlaneCarried;
 use super::plane_full::PlaneFull;
-use super::moved_leaves::SampledPatches;
 use super::plane_incremental::PlaneIncremental;
 use super::plane_sampled::PlaneSampled;
 use super::quadric::Quadrics;
@@ -28,6 +28,8 @@ pub struct RefitCounts {
 pub enum LightPath {
     /// Nothing: the surface shader takes the tangent plane.
     Tangent,
+    /// Nothing here: the depth maps of the lights are drawn with the shadows ([`super::depth_maps`]).
+    DepthMap,
     /// The planes at rest, uploaded once.
     Stale(wgpu::Buffer),
     /// The planes at rest, turned.
@@ -47,17 +49,39 @@ pub enum LightPath {
 pub enum Primitives<'a> {
     /// Nothing: the tangent plane is meant.
     Tangent,
+    /// Nothing a point: the depth maps of the lights.
+    DepthMaps,
     /// Unit normal and signed offset [m] of each point's plane, `[vec4f; points]`.
     Planes(&'a wgpu::Buffer),
     /// The matrix of each point's paraboloid [1/m], `[[vec4f; 2]; points]`.
     Quadrics(&'a wgpu::Buffer),
 }
 
+/// The shader text that finds a light's way by the primitives of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CoverKind {
+    /// `light_plane.wgsl`: the tangent plane, and one that was fitted.
+    Planes,
+    /// `light_quadric.wgsl`.
+    Quadrics,
+    /// `light_depth.wgsl`.
+    DepthMaps,
+}
+
 impl<'a> Primitives<'a> {
+    /// How the surface shader reads them.
+    pub fn cover(self) -> CoverKind {
+        match self {
+            Self::Tangent | Self::Planes(_) => CoverKind::Planes,
+            Self::Quadrics(_) => CoverKind::Quadrics,
+            Self::DepthMaps => CoverKind::DepthMaps,
+        }
+    }
+
     /// The buffer, if there is one.
     pub fn buffer(self) -> Option<&'a wgpu::Buffer> {
         match self {
-            Self::Tangent => None,
+            Self::Tangent | Self::DepthMaps => None,
             Self::Planes(buffer) | Self::Quadrics(buffer) => Some(buffer),
         }
     }
@@ -82,13 +106,16 @@ impl LightPath {
         buffers: &MeshBuffers,
         tangents: &Tangents,
     ) -> Result<Self, GpuError> {
-        if method == LightPathMethod::Tangent {
-            return Ok(Self::Tangent);
+        match method {
+            LightPathMethod::Tangent => return Ok(Self::Tangent),
+            LightPathMethod::DepthMap => return Ok(Self::DepthMap),
+            _ => {}
         }
         let normals = rest_normals(mesh, &Fans::new(mesh));
         let patches = Patches::new(&mesh.points, &normals, radius_m);
         Ok(match method {
             LightPathMethod::Tangent => Self::Tangent,
+            LightPathMethod::DepthMap => Self::DepthMap,
             LightPathMethod::Stale => {
                 let planes: Vec<[f32; 4]> = fit_planes(&mesh.points, &normals, &patches)
                     .into_iter()
@@ -139,7 +166,7 @@ impl LightPath {
     /// Adds this frame's passes to `encoder`, after the tangents.
     pub fn record(&self, encoder: &mut wgpu::CommandEncoder, timer: &mut Timer) {
         match self {
-            Self::Tangent | Self::Stale(_) => {}
+            Self::Tangent | Self::DepthMap | Self::Stale(_) => {}
             Self::Carried(pass) => pass.record(encoder, timer),
             Self::Full(pass) => pass.record(encoder, timer),
             Self::Incremental(pass) => pass.record(encoder, timer),
@@ -152,6 +179,7 @@ impl LightPath {
     pub fn primitives(&self) -> Primitives<'_> {
         match self {
             Self::Tangent => Primitives::Tangent,
+            Self::DepthMap => Primitives::DepthMaps,
             Self::Stale(planes) => Primitives::Planes(planes),
             Self::Carried(pass) => Primitives::Planes(&pass.planes),
             Self::Full(pass) => Primitives::Planes(&pass.planes),
@@ -165,14 +193,14 @@ impl LightPath {
     pub fn planes(&self) -> Option<&wgpu::Buffer> {
         match self.primitives() {
             Primitives::Planes(planes) => Some(planes),
-            Primitives::Tangent | Primitives::Quadrics(_) => None,
+            Primitives::Tangent | Primitives::DepthMaps | Primitives::Quadrics(_) => None,
         }
     }
 
     /// Names of the passes it records, as the timer knows them.
     pub fn pass_names(&self) -> &'static [&'static str] {
         match self {
-            Self::Tangent | Self::Stale(_) => &[],
+            Self::Tangent | Self::DepthMap | Self::Stale(_) => &[],
             Self::Carried(_) => &[PlaneCarried::NAME],
             Self::Full(_) => &[PlaneFull::NAME],
             Self::Incremental(_) => &[PlaneIncremental::NAME],
@@ -189,7 +217,9 @@ impl LightPath {
     /// [`GpuError::ReadBack`] if the counts can't be read.
     pub fn counts(&self, gpu: &Gpu) -> Result<RefitCounts, GpuError> {
         match self {
-            Self::Tangent | Self::Stale(_) | Self::Carried(_) => Ok(RefitCounts::default()),
+            Self::Tangent | Self::DepthMap | Self::Stale(_) | Self::Carried(_) => {
+                Ok(RefitCounts::default())
+            }
             Self::Full(pass) => Ok(RefitCounts {
                 refitted: pass.point_count,
                 moved: pass.point_count,

@@ -1,6 +1,7 @@
 //! One GPU pass a file. A pass owns the buffers it writes and is immutable once made.
 
 pub mod backdrop;
+pub mod depth_maps;
 pub mod draw;
 pub mod frame;
 pub mod geometry;

@@ -6,8 +6,7 @@ use super::mesh_buffers::MeshBuffers;
 use super::tangents::Tangents;
 use crate::geom::sample::{SAMPLES, Samples, half_tolerance_m};
 use crate::gpu::{
-    Binding, Entry, Gpu, GpuError, Kernel, Table, Wgsl, read_buffer, storage, uniform,
-    workgroups,
+    Binding, Entry, Gpu, GpuError, Kernel, Table, Wgsl, read_buffer, storage, uniform, workgroups,
 };
 use crate::wgsl;
 use glam::Vec3;
