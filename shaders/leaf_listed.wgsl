@@ -6,8 +6,9 @@ struct Params {
     slot_count: u32,
     // one over the radius of the patches
     per_m: f32,
+    // how near to the tangent plane a patch's mean lies that takes it without a fit
+    skip_m: f32,
     pad0: u32,
-    pad1: u32,
 }
 
 const SAMPLES: u32 = 16u;

@@ -2,6 +2,9 @@
 //
 //   m = sum_k w_k d_k,  C = sum_k w_k d_k d_k^T - m m^T,  sum_k w_k = 1     then as plane_fit.wgsl
 //
+// Where |N.m| < skip and the plane leans by less than skip over the patch's radius, the tangent plane is taken and
+// no direction looked for: on a sphere of radius R the mean lies r^2/4R deep.
+//
 // The weights are chosen at rest so that the samples have the moments of all members (src/geom/sample.rs).
 //
 // Source:  François et al., "Subsurface Texture Mapping" (2006), section 4, for the plane; the samples are those
@@ -13,6 +16,19 @@
 // Fails:   as plane_fit.wgsl; and what bends between the samples goes unseen.
 
 @group(0) @binding(8) var<storage, read_write> planes: array<vec4f>;
+
+// The lean of the plane is |C N - (N.C N) N| over the spread along the surface, r^2/4 of a disc; trace C is r^2/2.
+fn is_flat(mean: vec3f, spread: Spread, normal: vec3f) -> bool {
+    let turned = spread.squares * normal + vec3f(
+        spread.products.x * normal.y + spread.products.y * normal.z,
+        spread.products.x * normal.x + spread.products.z * normal.z,
+        spread.products.y * normal.x + spread.products.z * normal.y,
+    );
+    let along = turned - normal * dot(normal, turned);
+    let trace = spread.squares.x + spread.squares.y + spread.squares.z;
+    return abs(dot(normal, mean)) < params.skip_m
+        && 8.0 * dot(along, along) < params.skip_m * params.skip_m * trace;
+}
 
 @compute @workgroup_size(32)
 fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local: vec3u) {
@@ -36,5 +52,10 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local
         products += weighted.xxy * d.yzz;
     }
     let spread = Spread(squares - mean * mean, products - mean.xxy * mean.yzz);
-    planes[point] = plane_of_moments(mean, spread, normals[point].xyz);
+    let normal = normals[point].xyz;
+    if is_flat(mean, spread, normal) {
+        planes[point] = vec4f(normal, 0.0);
+    } else {
+        planes[point] = plane_of_moments(mean, spread, normal);
+    }
 }

@@ -21,7 +21,7 @@ use palpate::geom::tangent::{
 };
 use palpate::gpu::{Gpu, Timer, read_buffer};
 use palpate::passes::frame::{patch_radius_m, tolerance_m};
-use palpate::passes::light_path::LightPath;
+use palpate::passes::light_path::{LightPath, LightPathKnobs};
 use palpate::passes::mesh_buffers::MeshBuffers;
 use palpate::passes::plane_carried::planes_in_frames;
 use palpate::passes::tangents::Tangents;
@@ -161,16 +161,14 @@ impl Passes {
             Gpu::headless().expect("a GPU adapter; a software one (mesa-vulkan-drivers) will do");
         let buffers = MeshBuffers::new(&gpu, &organ.mesh).expect("the surface fits");
         let tangents = Tangents::new(&gpu, &organ.mesh, &buffers).expect("the pass is built");
-        let light_path = LightPath::new(
-            &gpu,
+        let knobs = LightPathKnobs {
             method,
-            organ.radius_m,
+            radius_m: organ.radius_m,
             tolerance_m,
-            &organ.mesh,
-            &buffers,
-            &tangents,
-        )
-        .expect("the pass is built");
+            skip_m: 0.0,
+        };
+        let light_path = LightPath::new(&gpu, knobs, &organ.mesh, &buffers, &tangents)
+            .expect("the pass is built");
         Self {
             timer: Timer::new(&gpu, 4),
             gpu,

@@ -119,8 +119,8 @@ fn mirrors() -> Vec<Mirror> {
             ListedParams {
                 slot_count,
                 per_m,
-                pad0,
-                pad1
+                skip_m,
+                pad0
             }
         )
     };

@@ -368,7 +368,7 @@ mod tests {
                 let members = patches.members(point).map(|m| points[m]);
                 let full = fit_plane(members, points[point], normals[point]);
                 let own = &samples.of_slot[slot];
-                let plane = fit_sampled_plane(own, points, points[point], normals[point]);
+                let plane = fit_sampled_plane(own, points, [points[point], normals[point]], 0.0);
                 (
                     plane.normal.angle_between(full.normal).to_degrees(),
                     (plane.offset_m - full.offset_m).abs() / radius_m,
@@ -428,8 +428,8 @@ mod tests {
                 ..sample
             });
             for (samples, sum) in [(own, &mut with), (&even, &mut without)] {
-                let at = mesh.points[point];
-                let plane = fit_sampled_plane(samples, &mesh.points, at, normals[point]);
+                let here = [mesh.points[point], normals[point]];
+                let plane = fit_sampled_plane(samples, &mesh.points, here, 0.0);
                 *sum += plane.normal.angle_between(full.normal).to_degrees();
             }
         }

@@ -3,7 +3,7 @@
 use super::depth_maps::DepthMaps;
 use super::draw::Target;
 use super::geometry::{Geometry, GeometryTargets};
-use super::light_path::{LightPath, RefitCounts};
+use super::light_path::{LightPath, LightPathKnobs, RefitCounts};
 use super::lightmap::{LightMap, uv_per_m};
 use super::maps::Maps;
 use super::mesh_buffers::MeshBuffers;
@@ -22,7 +22,7 @@ use super::{DEPTH_FORMAT, PICTURE_FORMAT, RADIANCE_FORMAT};
 use crate::geom::SurfaceMesh;
 use crate::geom::paint::TissueMaps;
 use crate::geom::patch::radius_from_extinction_m;
-use crate::geom::plane::LightPathMethod;
+use crate::geom::plane::{LightPathMethod, skip_from_optical_depth_m};
 use crate::gpu::{Gpu, GpuError, Timer, uniform};
 use crate::scene::{PlacedLight, RestBox, Scene, SurfaceKind, SurfaceSection};
 use glam::{Mat4, Vec3};
@@ -177,6 +177,19 @@ pub fn tolerance_m(scene: &Scene) -> f32 {
     told.unwrap_or_else(|| patch_radius_m(scene) / 4000.0)
 }
 
+/// What the light path of a scene is built from.
+pub fn light_path_knobs(scene: &Scene) -> LightPathKnobs {
+    LightPathKnobs {
+        method: effective_method(scene).unwrap_or(LightPathMethod::Tangent),
+        radius_m: patch_radius_m(scene),
+        tolerance_m: tolerance_m(scene),
+        skip_m: skip_from_optical_depth_m(
+            scene.light_path.skip_optical_depth,
+            scene.surface.bounding_extinction_per_m(),
+        ),
+    }
+}
+
 impl FramePasses {
     /// Builds what `scene` needs and nothing else, for pictures of `size` [px].
     ///
@@ -193,16 +206,8 @@ impl FramePasses {
     ) -> Result<Self, GpuError> {
         let mesh = MeshBuffers::new(gpu, surface_mesh)?;
         let tangents = Tangents::new(gpu, surface_mesh, &mesh)?;
-        let radius_m = patch_radius_m(scene);
-        let light_path = LightPath::new(
-            gpu,
-            effective_method(scene).unwrap_or(LightPathMethod::Tangent),
-            radius_m,
-            tolerance_m(scene),
-            surface_mesh,
-            &mesh,
-            &tangents,
-        )?;
+        let light_path =
+            LightPath::new(gpu, light_path_knobs(scene), surface_mesh, &mesh, &tangents)?;
         let lights = placed_lights(scene, rest);
         // Depth maps hold the shadow map too.
         let depth_maps = if matches!(light_path, LightPath::DepthMap) {

@@ -44,6 +44,20 @@ pub enum LightPath {
     Quadric(Quadrics),
 }
 
+/// What a scene says of its light path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightPathKnobs {
+    /// How the primitives follow the surface.
+    pub method: LightPathMethod,
+    /// Reach of a patch at rest [m].
+    pub radius_m: f32,
+    /// How far a point may lie from where its patches last saw it [m]; only methods that pass over what is still ask.
+    pub tolerance_m: f32,
+    /// `sampled`: a patch whose mean lies nearer to the tangent plane than this takes that plane, without a fit
+    /// [m]; 0 fits all.
+    pub skip_m: f32,
+}
+
 /// What the shaders read of a light path.
 #[derive(Clone, Copy, Debug)]
 pub enum Primitives<'a> {
@@ -88,10 +102,7 @@ impl<'a> Primitives<'a> {
 }
 
 impl LightPath {
-    /// Builds what `method` needs and nothing else.
-    ///
-    /// `radius_m` is the reach of a patch at rest; a point counts as moved when it lies farther than
-    /// `tolerance_m` from where its patches last saw it (only methods that pass over what is still ask).
+    /// Builds what the method needs and nothing else.
     ///
     /// # Errors
     ///
@@ -99,13 +110,17 @@ impl LightPath {
     /// and those of the kernels.
     pub fn new(
         gpu: &Gpu,
-        method: LightPathMethod,
-        radius_m: f32,
-        tolerance_m: f32,
+        knobs: LightPathKnobs,
         mesh: &SurfaceMesh,
         buffers: &MeshBuffers,
         tangents: &Tangents,
     ) -> Result<Self, GpuError> {
+        let LightPathKnobs {
+            method,
+            radius_m,
+            tolerance_m,
+            skip_m,
+        } = knobs;
         match method {
             LightPathMethod::Tangent => return Ok(Self::Tangent),
             LightPathMethod::DepthMap => return Ok(Self::DepthMap),
@@ -145,6 +160,7 @@ impl LightPath {
                     dependents: &dependents,
                     radius_m,
                     tolerance_m,
+                    skip_m,
                 };
                 let points = &mesh.points;
                 if method == LightPathMethod::Sampled {

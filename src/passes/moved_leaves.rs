@@ -30,8 +30,8 @@ pub struct MovedParams {
 pub struct ListedParams {
     pub slot_count: u32,
     pub per_m: f32,
+    pub skip_m: f32,
     pub pad0: u32,
-    pub pad1: u32,
 }
 
 /// The kernel that lists leaves, and what a kernel over the listed ones reads.
@@ -60,6 +60,8 @@ pub struct SampledPatches<'a> {
     pub radius_m: f32,
     /// How far a fit may lag behind its samples [m].
     pub tolerance_m: f32,
+    /// Of planes: how near to the tangent plane a patch's mean lies that takes it without a fit [m].
+    pub skip_m: f32,
 }
 
 impl MovedLeaves {
@@ -135,8 +137,8 @@ impl MovedLeaves {
         let params = ListedParams {
             slot_count: slot_count as u32,
             per_m: 1.0 / patches.radius_m,
+            skip_m: patches.skip_m,
             pad0: 0,
-            pad1: 0,
         };
         Ok(Self {
             kernel,

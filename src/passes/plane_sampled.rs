@@ -62,10 +62,11 @@ impl PlaneSampled {
     ) -> Result<Self, GpuError> {
         let leaves =
             MovedLeaves::with_source(gpu, Self::NAME, points, patches, buffers, moved_source)?;
-        let rest: Vec<[f32; 4]> = fit_sampled_planes(points, normals, patches.samples)
-            .into_iter()
-            .map(|plane| plane.to_array())
-            .collect();
+        let rest: Vec<[f32; 4]> =
+            fit_sampled_planes(points, normals, patches.samples, patches.skip_m)
+                .into_iter()
+                .map(|plane| plane.to_array())
+                .collect();
         let planes = storage(gpu, "planes", &rest)?;
         let kernel = Kernel::new(
             gpu,

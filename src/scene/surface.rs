@@ -217,6 +217,12 @@ impl SurfaceSection {
         ] {
             c.range(&format!("surface.{name}"), value, 0.0, high);
         }
+        if self.thickness_follows_volume && self.uv_metric == UvMetric::Unit {
+            c.problem(
+                "surface.thickness_follows_volume",
+                "it reads the area from the deformed metric: set surface.uv_metric to \"deformed\"",
+            );
+        }
         c.range("surface.roughness", self.roughness, 0.02, 1.0);
         c.range(
             "surface.light_map_size_px",
