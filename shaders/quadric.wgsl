@@ -15,7 +15,9 @@
 //          bend along it is told.
 
 const RIDGE: f32 = 1e-4;
-const MIN_TRACE: f32 = 1e-12;
+// Of the matrix's squared size, a^2 + 2 b^2 + c^2.
+const SIZE_OF: vec3f = vec3f(1.0, 2.0, 1.0);
+const MIN_REACH: f32 = 1e-12;
 const POINTS_MIN: u32 = 3u;
 
 // xx, yy, zz, 0 and xy, xz, yz, 0 of each point
@@ -67,13 +69,14 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local
         beside += weighted.xxy * basis.yzz;
         right += dot(d, normal) * weighted;
     }
-    let trace = diagonal.x + diagonal.y + diagonal.z;
-    if count < POINTS_MIN || !(trace > MIN_TRACE) {
+    // sum_k w_k (u_k^2 + v_k^2)^2 / 4, whichever way the axes are turned
+    let reach = diagonal.x + 0.5 * diagonal.y + diagonal.z;
+    if count < POINTS_MIN || !(reach > MIN_REACH) {
         quadrics[point][0] = vec4f(0.0);
         quadrics[point][1] = vec4f(0.0);
         return;
     }
-    let bends = params.per_m * solve(diagonal + RIDGE * trace, beside, right);
+    let bends = params.per_m * solve(diagonal + RIDGE * reach * SIZE_OF, beside, right);
     let uu = bends.x * u_axis;
     let uv = bends.y * u_axis;
     let vv = bends.z * v_axis;

@@ -188,7 +188,8 @@ fn ways_read_from_depth_maps_are_the_chords_of_a_sphere() {
         errors.sort_by(f32::total_cmp);
         let error = errors[errors.len() * 98 / 100];
         println!("light {k}: p98 {error:.2e} m");
-        // A texel is 0.14 mm; triangles lie 0.01 mm below the sphere, and where light grazes they are met farther on.
-        assert!(error < 2e-4, "light {k}: {error} m");
+        // Triangles lie 0.02 mm below the sphere, and where light grazes they are met farther on. A texel is 0.14 mm:
+        // entries taken as they are, without the cut by their plane, err by as much.
+        assert!(error < 1e-4, "light {k}: {error} m");
     }
 }

@@ -154,7 +154,15 @@ fn layers_thin_as_the_surface_stretches_where_the_scene_asks_and_stay_where_it_d
 #[test]
 fn thinner_layers_are_a_change_that_shows() {
     let gpu = gpu();
-    let seen = |sets: &[&str]| draw(&gpu, sets, Vec3::new(1.5, 1.2, 1.0)).radiance;
+    // Light that scattered once, alone.
+    let seen = |sets: &[&str]| {
+        let sets = [
+            &["surface.multiple_scattering=0.0", "surface.wetness=0.0"],
+            sets,
+        ]
+        .concat();
+        draw(&gpu, &sets, Vec3::new(1.5, 1.2, 1.0)).radiance
+    };
     let kept = seen(&["surface.thickness_follows_volume=true"]);
     let plain = seen(&[]);
     let change = (kept - plain).truncate().length() / plain.truncate().length();

@@ -12,12 +12,15 @@ use super::sample::{Sample, Samples};
 use super::tangent::any_perpendicular;
 use glam::{DMat3, DVec3, Mat3, Vec3};
 
-/// Share of the trace that is added to the diagonal of the normal equations; the same in `quadric.wgsl`. It
-/// bends what too few samples leave open back to the tangent plane, and shortens a curvature by a thousandth.
+/// Weight of the squared size of the matrix, a² + 2 b² + c², as a share of Σ w (u² + v²)²/4; the same in
+/// `quadric.wgsl`. It bends what too few samples leave open back to the tangent plane, and shortens a curvature by
+/// a thousandth. Neither depends on how the axes are turned.
 const RIDGE: f32 = 1e-4;
-/// Traces below this, of samples measured in patch radii, are those of a single place; the same in
+/// The squared size by component; the same in `quadric.wgsl`.
+const SIZE_OF: Vec3 = Vec3::new(1.0, 2.0, 1.0);
+/// Values of that sum below this, of samples measured in patch radii, are those of a single place; the same in
 /// `quadric.wgsl`.
-const MIN_TRACE: f32 = 1e-12;
+const MIN_REACH: f32 = 1e-12;
 /// Points that a fit asks for, P among them; the same in `quadric.wgsl`.
 const POINTS_MIN: u32 = 3;
 
@@ -101,11 +104,12 @@ pub fn fit_quadric(
             sample.weight * Vec3::new(basis.x * basis.y, basis.x * basis.z, basis.y * basis.z);
         right += sample.weight * z * basis;
     }
-    let trace = diagonal.x + diagonal.y + diagonal.z;
-    if count < POINTS_MIN || !(trace > MIN_TRACE) {
+    // Σ w (u² + v²)² / 4
+    let reach = diagonal.x + 0.5 * diagonal.y + diagonal.z;
+    if count < POINTS_MIN || !(reach > MIN_REACH) {
         return Quadric::default();
     }
-    let bends = solve(diagonal + RIDGE * trace, beside, right);
+    let bends = solve(diagonal + RIDGE * reach * SIZE_OF, beside, right);
     Quadric::in_world((bends * per_m).to_array(), u_axis, v_axis)
 }
 
@@ -158,7 +162,11 @@ pub fn exact_quadric(
         system += basis * basis.transpose() * weight;
         right += basis * (weight * d.dot(normal));
     }
-    system += nalgebra::Matrix3::identity() * (f64::from(RIDGE) * system.trace());
+    let reach = system[(0, 0)] + 0.5 * system[(1, 1)] + system[(2, 2)];
+    let size_of = SIZE_OF.as_dvec3();
+    for (i, size) in size_of.to_array().into_iter().enumerate() {
+        system[(i, i)] += f64::from(RIDGE) * reach * size;
+    }
     let bends = system.cholesky()?.solve(&right);
     let outer = |p: DVec3, q: DVec3| DMat3::from_cols(p * q.x, p * q.y, p * q.z);
     Some(

@@ -55,6 +55,7 @@ mod tests {
     fn an_entry_that_light_grazes_has_a_finite_way() {
         let (s, cosine) =
             way_from_entry(0.001 * Vec3::Z, Vec3::Z, Vec3::ZERO, Vec3::X, 0.0).unwrap();
-        assert_eq!((s, cosine), (0.02, 0.05));
+        assert_eq!(cosine, 0.05);
+        assert!((s - 0.02).abs() < 1e-7, "{s}");
     }
 }
