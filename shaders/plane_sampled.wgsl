@@ -1,6 +1,6 @@
 // Least-squares plane of sixteen weighted samples of a patch, about its point.
 //
-//   m = sum_k w_k d_k,  C = sum_k w_k d_k d_k^T - m m^T,  sum_k w_k = 1     then as plane_fit.wgsl
+//   m = sum_k w_k d_k / W,  C = sum_k w_k d_k d_k^T / W - m m^T,  W = sum_k w_k     then as plane_fit.wgsl
 //
 // Where |N.m| < skip and the plane leans by less than skip over the patch's radius, the tangent plane is taken and
 // no direction looked for: on a sphere of radius R the mean lies r^2/4R deep.
@@ -16,6 +16,21 @@
 // Fails:   as plane_fit.wgsl; and what bends between the samples goes unseen.
 
 @group(0) @binding(8) var<storage, read_write> planes: array<vec4f>;
+
+struct Sums {
+    weight: f32,
+    sum: vec3f,
+    squares: vec3f,
+    products: vec3f,
+}
+
+fn add(sums: ptr<function, Sums>, d: vec3f, weight: f32) {
+    let weighted = weight * d;
+    (*sums).weight += weight;
+    (*sums).sum += weighted;
+    (*sums).squares += weighted * d;
+    (*sums).products += weighted.xxy * d.yzz;
+}
 
 // The lean of the plane is |C N - (N.C N) N| over the spread along the surface, r^2/4 of a disc; trace C is r^2/2.
 fn is_flat(mean: vec3f, spread: Spread, normal: vec3f) -> bool {
@@ -40,18 +55,14 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local
     let point = order[slot];
     let at = textureLoad(positions, entry(point), 0).xyz;
     commit(leaf, slot, point, at);
-    var mean = vec3f(0.0);
-    var squares = vec3f(0.0);
-    var products = vec3f(0.0);
-    for (var k = 0u; k < SAMPLES; k += 1u) {
-        let sample = textureLoad(samples, entry(SAMPLES * slot + k), 0).xy;
-        let d = textureLoad(positions, entry(sample.x), 0).xyz - at;
-        let weighted = bitcast<f32>(sample.y) * d;
-        mean += weighted;
-        squares += weighted * d;
-        products += weighted.xxy * d.yzz;
-    }
-    let spread = Spread(squares - mean * mean, products - mean.xxy * mean.yzz);
+    var sums: Sums;
+    add_samples(&sums, slot, at);
+    let share = 1.0 / sums.weight;
+    let mean = share * sums.sum;
+    let spread = Spread(
+        share * sums.squares - mean * mean,
+        share * sums.products - mean.xxy * mean.yzz,
+    );
     let normal = normals[point].xyz;
     if is_flat(mean, spread, normal) {
         planes[point] = vec4f(normal, 0.0);

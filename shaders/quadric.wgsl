@@ -3,7 +3,8 @@
 //   z = 1/2 (a u^2 + 2 b u v + c v^2),   min sum_k w_k (z(u_k, v_k) - z_k)^2 + ridge
 //   Q = a uu^T + b (uv^T + vu^T) + c vv^T        kept in world axes: no frame that vertices would have to share
 //
-// Samples whose normal is turned away lie on another sheet and are passed over.
+// Samples that lie steeper than 45 degrees over or under the tangent plane are passed over: on a sphere the chord to a
+// place rises by half of what its normal is turned, so those are the ones whose normal is turned away.
 //
 // Source:  do Carmo, "Differential Geometry of Curves and Surfaces" (1976), 3.3 (the osculating paraboloid);
 //          Golub and Van Loan, "Matrix Computations", 4.1 (LDL^T).
@@ -18,10 +19,36 @@ const RIDGE: f32 = 1e-4;
 // Of the matrix's squared size, a^2 + 2 b^2 + c^2.
 const SIZE_OF: vec3f = vec3f(1.0, 2.0, 1.0);
 const MIN_REACH: f32 = 1e-12;
+const MAX_REACH: f32 = 1e30;
 const POINTS_MIN: u32 = 3u;
 
 // xx, yy, zz, 0 and xy, xz, yz, 0 of each point
 @group(0) @binding(8) var<storage, read_write> quadrics: array<array<vec4f, 2>>;
+
+struct Sums {
+    // tangent, bitangent, normal
+    u_axis: vec3f,
+    v_axis: vec3f,
+    normal: vec3f,
+    count: u32,
+    diagonal: vec3f,
+    beside: vec3f,
+    right: vec3f,
+}
+
+fn add(sums: ptr<function, Sums>, d_m: vec3f, weight: f32) {
+    let d = params.per_m * d_m;
+    let u = dot(d, (*sums).u_axis);
+    let v = dot(d, (*sums).v_axis);
+    let z = dot(d, (*sums).normal);
+    let counts = weight > 0.0 && z * z <= u * u + v * v;
+    let basis = vec3f(0.5 * u * u, u * v, 0.5 * v * v);
+    let weighted = select(0.0, weight, counts) * basis;
+    (*sums).count += select(0u, 1u, counts);
+    (*sums).diagonal += weighted * basis;
+    (*sums).beside += weighted.xxy * basis.yzz;
+    (*sums).right += z * weighted;
+}
 
 // Solves a positive definite system by LDL^T; `beside` holds the entries 01, 02, 12.
 fn solve(diagonal: vec3f, beside: vec3f, right: vec3f) -> vec3f {
@@ -51,32 +78,17 @@ fn main(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_id) local
     let normal = normals[point].xyz;
     let u_axis = any_perpendicular(normal);
     let v_axis = cross(normal, u_axis);
-    var count = 0u;
-    var diagonal = vec3f(0.0);
-    var beside = vec3f(0.0);
-    var right = vec3f(0.0);
-    for (var k = 0u; k < SAMPLES; k += 1u) {
-        let sample = textureLoad(samples, entry(SAMPLES * slot + k), 0).xy;
-        let weight = bitcast<f32>(sample.y);
-        let counts = weight > 0.0 && dot(normals[sample.x].xyz, normal) > 0.0;
-        count += select(0u, 1u, counts);
-        let d = (textureLoad(positions, entry(sample.x), 0).xyz - at) * params.per_m;
-        let u = dot(d, u_axis);
-        let v = dot(d, v_axis);
-        let basis = vec3f(0.5 * u * u, u * v, 0.5 * v * v);
-        let weighted = select(0.0, weight, counts) * basis;
-        diagonal += weighted * basis;
-        beside += weighted.xxy * basis.yzz;
-        right += dot(d, normal) * weighted;
-    }
+    var sums = Sums(u_axis, v_axis, normal, 0u, vec3f(0.0), vec3f(0.0), vec3f(0.0));
+    add_samples(&sums, slot, at);
+    let diagonal = sums.diagonal;
     // sum_k w_k (u_k^2 + v_k^2)^2 / 4, whichever way the axes are turned
     let reach = diagonal.x + 0.5 * diagonal.y + diagonal.z;
-    if count < POINTS_MIN || !(reach > MIN_REACH) {
+    if sums.count < POINTS_MIN || !(reach > MIN_REACH && reach < MAX_REACH) {
         quadrics[point][0] = vec4f(0.0);
         quadrics[point][1] = vec4f(0.0);
         return;
     }
-    let bends = params.per_m * solve(diagonal + RIDGE * reach * SIZE_OF, beside, right);
+    let bends = params.per_m * solve(diagonal + RIDGE * reach * SIZE_OF, sums.beside, sums.right);
     let uu = bends.x * u_axis;
     let uv = bends.y * u_axis;
     let vv = bends.z * v_axis;

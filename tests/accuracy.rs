@@ -333,8 +333,11 @@ fn sampled_error(
     let samples = samples.weighted_to_the_middle(&mesh.points);
     let angles = (0..points.len()).map(|slot| {
         let own = samples.order[slot] as usize;
-        let faces = |s: &Sample| normals[s.point as usize].dot(normals[own]) > 0.0;
-        let members = samples.weighing(slot).filter(faces);
+        let counts = |s: &Sample| {
+            let d = at(s.point) - points[own].as_dvec3();
+            2.0 * d.dot(normals[own]).powi(2) <= d.length_squared()
+        };
+        let members = samples.weighing(slot).filter(counts);
         let members = members.map(|s| (at(s.point), f64::from(s.weight)));
         let exact =
             exact_quadric(members, points[own].as_dvec3(), normals[own]).expect("16 samples");

@@ -298,7 +298,7 @@ impl Run<'_> {
             {
                 let p = samples.order[slot] as usize;
                 let own = &samples.of_slot[slot];
-                twin[p] = fit_quadric(own, points, &normals, [points[p], normals[p]], per_m);
+                twin[p] = fit_quadric(own, points, [points[p], normals[p]], per_m);
             }
             let counts = pass.leaves.counts(gpu).expect("counts can be read");
             same &= (counts.moved, counts.refitted) == (found.moved, found.refitted);
@@ -443,9 +443,10 @@ fn sampled_plane_parity_check_rejects_sabotaged_kernels() {
     let body = Body::new(&gpu, wavy(33));
     let frames = frames_of(&body.mesh.points);
     let fitting = [
-        ("bitcast<f32>(sample.y) * d", "0.0625 * d"),
-        ("k < SAMPLES; k", "k < 8u; k"),
+        ("let weighted = weight * d;", "let weighted = 0.0625 * d;"),
+        ("side < 2u", "side < 1u"),
         ("squares - mean * mean", "squares"),
+        ("(*sums).weight += weight", "(*sums).weight += 0.06"),
         (
             "textureStore(committed",
             "if slot > 99999u { textureStore(committed",
@@ -555,8 +556,11 @@ fn errors_deg(gpu: &Gpu, body: &Body, path: &LightPath, points: &[Vec3]) -> Vec<
                 .map(|slot| {
                     let own = body.middle.order[slot];
                     let normal = normals[own as usize].as_dvec3();
-                    let faces = |p: u32| normals[p as usize].as_dvec3().dot(normal) > 0.0;
-                    let samples = body.middle.weighing(slot).filter(|s| faces(s.point));
+                    let counts = |p: u32| {
+                        let d = at(p) - at(own);
+                        2.0 * d.dot(normal).powi(2) <= d.length_squared()
+                    };
+                    let samples = body.middle.weighing(slot).filter(|s| counts(s.point));
                     let exact = exact_quadric(
                         samples.map(|s| (at(s.point), f64::from(s.weight))),
                         at(own),

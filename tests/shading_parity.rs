@@ -5,6 +5,7 @@
 
 use glam::{Vec3, Vec4};
 use palpate::geom::SurfaceMesh;
+use palpate::geom::plane::LightPathMethod;
 use palpate::gpu::{
     Binding, Gpu, Kernel, Wgsl, join, read_buffer, read_texture_rgba16f, storage, uniform,
 };
@@ -988,6 +989,67 @@ fn ball(gpu: &Gpu, kind: &str, sets: &[&str], light: &str) -> Vec<Vec4> {
         .chunks_exact(4)
         .map(Vec4::from_slice)
         .collect()
+}
+
+#[test]
+fn the_lit_side_is_bright_by_every_light_path() {
+    let gpu = gpu();
+    for method in LightPathMethod::ALL {
+        let method = format!("light_path.method={}", method.name());
+        let sets = [method.as_str(), "light_path.radius_m=0.01"];
+        for light in [
+            "toward = [1.0, 0.2, 0.0]\nshadow = true",
+            "toward = [1.0, 0.2, 0.0]",
+            "at_m = [0.12, 0.0, 0.0]",
+        ] {
+            let pixels = ball(&gpu, "subsurface", &sets, light);
+            assert!(pixels.iter().all(|pixel| pixel.is_finite()), "{method}");
+            let [left, right] = halves(&pixels);
+            assert!(right > 3.0 * left, "{method}, {light}: {left} and {right}");
+        }
+    }
+}
+
+#[test]
+fn below_a_ball_quadrics_come_nearer_than_planes_to_what_depth_maps_read() {
+    let gpu = gpu();
+    // Light that scattered once, alone, in tissue clear enough for the ball to be seen bent.
+    let by = |method: &str| {
+        let method = format!("light_path.method={method}");
+        let sets = [
+            method.as_str(),
+            "light_path.radius_m=0.015",
+            "surface.multiple_scattering=0.0",
+            "surface.wetness=0.0",
+            "surface.color_blend=0.0",
+            "surface.samples=16",
+            "surface.layer.0.absorption_per_m=[5.0, 10.0, 20.0]",
+            "surface.layer.1.absorption_per_m=[5.0, 10.0, 20.0]",
+            "surface.layer.2.absorption_per_m=[5.0, 10.0, 20.0]",
+            "surface.layer.3.absorption_per_m=[5.0, 10.0, 20.0]",
+            "surface.layer_depth_max_m=0.03",
+        ];
+        ball(&gpu, "subsurface", &sets, "toward = [0.7, 0.3, 0.6]")
+    };
+    let read = by("depth-map");
+    let error = |method: &str| {
+        let [sum, norm] = by(method)
+            .iter()
+            .zip(&read)
+            .fold([0.0_f32; 2], |[sum, norm], (a, b)| {
+                [
+                    sum + (*a - *b).length_squared(),
+                    norm + b.truncate().length_squared(),
+                ]
+            });
+        (sum / norm).sqrt()
+    };
+    let [quadric, full, tangent] = ["quadric", "full", "tangent"].map(error);
+    println!("from depth maps: quadric {quadric:.4}, full {full:.4}, tangent {tangent:.4}");
+    assert!(
+        quadric < 0.6 * full && quadric < 0.6 * tangent,
+        "{quadric}, {full}, {tangent}"
+    );
 }
 
 /// Mean brightness of the covered pixels of the left and the right half.

@@ -214,18 +214,22 @@ pub fn fit_sampled_plane(
     [at, normal]: [Vec3; 2],
     skip_m: f32,
 ) -> Plane {
-    let mut mean = Vec3::ZERO;
+    let mut total = 0.0;
+    let mut sum = Vec3::ZERO;
     let mut squares = Vec3::ZERO;
     let mut products = Vec3::ZERO;
     for sample in samples {
         let d = points[sample.point as usize] - at;
-        mean += sample.weight * d;
+        total += sample.weight;
+        sum += sample.weight * d;
         squares += sample.weight * d * d;
         products += sample.weight * Vec3::new(d.x * d.y, d.x * d.z, d.y * d.z);
     }
+    let share = 1.0 / total;
+    let mean = share * sum;
     let spread = Spread {
-        squares: squares - mean * mean,
-        products: products - Vec3::new(mean.x * mean.y, mean.x * mean.z, mean.y * mean.z),
+        squares: share * squares - mean * mean,
+        products: share * products - Vec3::new(mean.x * mean.y, mean.x * mean.z, mean.y * mean.z),
     };
     if is_flat(mean, spread, normal, skip_m) {
         return Plane::tangent(normal);

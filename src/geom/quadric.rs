@@ -21,6 +21,8 @@ const SIZE_OF: Vec3 = Vec3::new(1.0, 2.0, 1.0);
 /// Values of that sum below this, of samples measured in patch radii, are those of a single place; the same in
 /// `quadric.wgsl`.
 const MIN_REACH: f32 = 1e-12;
+/// And above this, of what was torn apart beyond all measure; the same in `quadric.wgsl`.
+const MAX_REACH: f32 = 1e30;
 /// Points that a fit asks for, P among them; the same in `quadric.wgsl`.
 const POINTS_MIN: u32 = 3;
 
@@ -71,8 +73,9 @@ impl Quadric {
 
 /// Least-squares paraboloid through the point `at` [m] with unit normal `normal`, over its `samples`.
 ///
-/// `per_m` is one over the patch's radius and sets the scale of the arithmetic alone. Samples whose normal is
-/// turned away are passed over: the surface over the tangent plane is another sheet there. The tangent plane
+/// `per_m` is one over the patch's radius and sets the scale of the arithmetic alone. Samples that lie steeper than
+/// 45 degrees over or under the tangent plane are passed over: on a sphere the chord to a place rises by half of what
+/// its normal is turned, so those are the ones whose normal is turned away. The tangent plane
 /// for fewer than three points, P among them, and for points at one place; along one line only the curvature
 /// along it is told.
 ///
@@ -80,7 +83,6 @@ impl Quadric {
 pub fn fit_quadric(
     samples: &[Sample],
     points: &[Vec3],
-    normals: &[Vec3],
     [at, normal]: [Vec3; 2],
     per_m: f32,
 ) -> Quadric {
@@ -91,13 +93,12 @@ pub fn fit_quadric(
     let mut beside = Vec3::ZERO;
     let mut right = Vec3::ZERO;
     for sample in samples {
-        let point = sample.point as usize;
-        if sample.weight <= 0.0 || normals[point].dot(normal) <= 0.0 {
+        let d = (points[sample.point as usize] - at) * per_m;
+        let (u, v, z) = (d.dot(u_axis), d.dot(v_axis), d.dot(normal));
+        if sample.weight <= 0.0 || z * z > u * u + v * v {
             continue;
         }
         count += 1;
-        let d = (points[point] - at) * per_m;
-        let (u, v, z) = (d.dot(u_axis), d.dot(v_axis), d.dot(normal));
         let basis = Vec3::new(0.5 * u * u, u * v, 0.5 * v * v);
         diagonal += sample.weight * basis * basis;
         beside +=
@@ -106,7 +107,7 @@ pub fn fit_quadric(
     }
     // Σ w (u² + v²)² / 4
     let reach = diagonal.x + 0.5 * diagonal.y + diagonal.z;
-    if count < POINTS_MIN || !(reach > MIN_REACH) {
+    if count < POINTS_MIN || !(MIN_REACH..MAX_REACH).contains(&reach) {
         return Quadric::default();
     }
     let bends = solve(diagonal + RIDGE * reach * SIZE_OF, beside, right);
@@ -139,7 +140,7 @@ pub fn fit_quadrics(
     for (own, &point) in samples.of_slot.iter().zip(&samples.order) {
         let point = point as usize;
         let here = [points[point], normals[point]];
-        quadrics[point] = fit_quadric(own, points, normals, here, per_m);
+        quadrics[point] = fit_quadric(own, points, here, per_m);
     }
     quadrics
 }
@@ -200,13 +201,13 @@ mod tests {
         (samples.collect(), places)
     }
 
-    fn fit(samples: &[Sample], points: &[Vec3], normals: &[Vec3]) -> Quadric {
-        fit_quadric(samples, points, normals, [points[0], normals[0]], 100.0)
+    fn fit(samples: &[Sample], points: &[Vec3], up: Vec3) -> Quadric {
+        fit_quadric(samples, points, [points[0], up], 100.0)
     }
 
     fn fit_of_graph(r_m: f32, height: impl Fn(f32, f32) -> f32) -> [f32; 3] {
         let (samples, points) = on_graph(r_m, height);
-        fit(&samples, &points, &[Vec3::Y; 16]).in_frame(Vec3::X, Vec3::Z)
+        fit(&samples, &points, Vec3::Y).in_frame(Vec3::X, Vec3::Z)
     }
 
     #[test]
@@ -248,8 +249,8 @@ mod tests {
         let (samples, points) = on_graph(0.01, |x, z| 10.0 * x * x + 4.0 * x * z - 7.0 * z * z);
         let turn = Quat::from_euler(glam::EulerRot::XYZ, 1.0, -2.0, 0.5);
         let turned: Vec<Vec3> = points.iter().map(|&p| turn * p + Vec3::ONE).collect();
-        let at_rest = fit(&samples, &points, &[Vec3::Y; 16]).in_frame(Vec3::X, Vec3::Z);
-        let moved = fit(&samples, &turned, &[turn * Vec3::Y; 16]);
+        let at_rest = fit(&samples, &points, Vec3::Y).in_frame(Vec3::X, Vec3::Z);
+        let moved = fit(&samples, &turned, turn * Vec3::Y);
         let moved = moved.in_frame(turn * Vec3::X, turn * Vec3::Z);
         for (a, b) in at_rest.iter().zip(moved) {
             // Places are rounded to 1e-7 m: 1e-5 of the patch, and squared over heights of 1 mm.
@@ -260,13 +261,13 @@ mod tests {
     #[test]
     fn patches_that_leave_it_open_have_the_tangent_plane_or_the_bend_along_their_line() {
         let sample = |point, weight| Sample { point, weight };
-        let up = [Vec3::Y; 16];
+        let up = Vec3::Y;
         let two = [sample(0, 0.5), sample(1, 0.5)];
         let points = [Vec3::ZERO, Vec3::new(0.01, 0.001, 0.0)];
-        assert_eq!(fit(&two, &points, &up), Quadric::default());
+        assert_eq!(fit(&two, &points, up), Quadric::default());
         let same: Vec<Sample> = (0..16).map(|i| sample(i, 1.0 / 16.0)).collect();
-        assert_eq!(fit(&same, &[Vec3::ONE; 16], &up), Quadric::default());
-        assert_eq!(fit(&[], &points, &up), Quadric::default());
+        assert_eq!(fit(&same, &[Vec3::ONE; 16], up), Quadric::default());
+        assert_eq!(fit(&[], &points, up), Quadric::default());
 
         let line: Vec<Vec3> = (0..16)
             .map(|i| {
@@ -274,7 +275,7 @@ mod tests {
                 Vec3::new(x, 5.0 * x * x, 0.0)
             })
             .collect();
-        let [a, b, c] = fit(&same, &line, &up).in_frame(Vec3::X, Vec3::Z);
+        let [a, b, c] = fit(&same, &line, up).in_frame(Vec3::X, Vec3::Z);
         assert!((a - 10.0).abs() < 0.02, "{a}");
         assert!(b.abs() < 1e-3 && c.abs() < 1e-3, "{b} {c}");
     }
@@ -282,16 +283,28 @@ mod tests {
     #[test]
     fn samples_on_a_sheet_that_is_folded_over_are_passed_over() {
         let (samples, mut points) = on_graph(0.01, |x, z| 10.0 * (x * x + z * z));
-        let mut normals = [Vec3::Y; 16];
-        let sound = fit(&samples, &points, &normals);
+        let sound = fit(&samples, &points, Vec3::Y);
         for i in [9, 12, 15] {
-            points[i] = Vec3::new(0.002, -0.02, 0.001 * i as f32);
-            normals[i] = Vec3::NEG_Y;
+            points[i] = Vec3::new(0.002, -0.02, 0.001 * i as f32 - 0.012);
         }
-        let folded = fit(&samples, &points, &normals);
+        let folded = fit(&samples, &points, Vec3::Y);
         assert!((folded.squares - sound.squares).length() < 0.1);
-        let unfiltered = fit(&samples, &points, &[Vec3::Y; 16]);
-        assert!((unfiltered.squares - sound.squares).length() > 10.0);
+        // Lying flatter they count, and show.
+        for i in [9, 12, 15] {
+            points[i].y = -0.002;
+        }
+        let flatter = fit(&samples, &points, Vec3::Y);
+        assert!((flatter.squares - sound.squares).length() > 1.0);
+    }
+
+    #[test]
+    fn chords_of_a_sphere_rise_by_half_of_what_its_normals_are_turned() {
+        for degrees in [10.0_f32, 60.0, 89.0, 91.0, 150.0] {
+            let turned = degrees.to_radians();
+            let (rho, z) = (turned.sin(), turned.cos() - 1.0);
+            assert!((z.abs().atan2(rho) - 0.5 * turned).abs() < 1e-5);
+            assert_eq!(z * z <= rho * rho, degrees < 90.0);
+        }
     }
 
     proptest! {
@@ -316,8 +329,19 @@ mod tests {
                 })
                 .collect();
             let normal = turn * Vec3::Y;
-            let found = fit(&samples, &points, &[normal; 16]);
-            let places = samples.iter().map(|s| (points[s.point as usize].as_dvec3(), 0.0625));
+            let found = fit(&samples, &points, normal);
+            let counts = |p: &DVec3| {
+                let d = *p - points[0].as_dvec3();
+                2.0 * d.dot(normal.as_dvec3()).powi(2) <= d.length_squared()
+            };
+            // At the very edge of what counts, a rounding decides.
+            let edge = |p: &Vec3| {
+                let d = *p - points[0];
+                (2.0 * d.dot(normal).powi(2) - d.length_squared()).abs() < 1e-4 * d.length_squared()
+            };
+            prop_assume!(!points[1..].iter().any(edge));
+            let places = points.iter().map(|p| p.as_dvec3()).filter(counts).map(|p| (p, 0.0625));
+            prop_assume!(places.clone().count() > 2);
             let exact = exact_quadric(places, points[0].as_dvec3(), normal.as_dvec3())
                 .expect("the ridge determines it");
             for axis in [Vec3::X, Vec3::Y, Vec3::Z] {

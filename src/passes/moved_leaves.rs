@@ -4,7 +4,7 @@
 use super::light_path::RefitCounts;
 use super::mesh_buffers::MeshBuffers;
 use super::tangents::Tangents;
-use crate::geom::sample::{SAMPLES, Samples, half_tolerance_m};
+use crate::geom::sample::{Samples, half_tolerance_m};
 use crate::gpu::{
     Binding, Entry, Gpu, GpuError, Kernel, Table, Wgsl, read_buffer, storage, uniform, workgroups,
 };
@@ -92,13 +92,6 @@ impl MovedLeaves {
             .map(|&point| points[point as usize].extend(point as f32).to_array())
             .collect();
         let committed = Table::new(gpu, "committed places", Entry::Floats, &places)?;
-        let pairs: Vec<[u32; 2]> = samples
-            .of_slot
-            .iter()
-            .flatten()
-            .map(|sample| [sample.point, sample.weight.to_bits()])
-            .collect();
-        debug_assert_eq!(pairs.len(), SAMPLES * slot_count);
         let mut start = vec![0_u32];
         for list in patches.dependents {
             start.push(start[start.len() - 1] + list.len() as u32);
@@ -148,7 +141,7 @@ impl MovedLeaves {
             listed,
             moved_leaves,
             committed,
-            samples: Table::new(gpu, "samples", Entry::Pairs, &pairs)?,
+            samples: Table::new(gpu, "samples", Entry::Quads, &samples.packed())?,
             order: storage(gpu, "slot order", &samples.order)?,
             params: uniform(gpu, pass, &params),
         })

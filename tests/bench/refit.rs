@@ -164,7 +164,10 @@ fn quadric_errors_deg(
         let normal = normals[own].truncate().as_dvec3();
         let members = samples
             .weighing(slot)
-            .filter(|s| normals[s.point as usize].truncate().as_dvec3().dot(normal) > 0.0)
+            .filter(|s| {
+                let d = (points[s.point as usize] - points[own]).as_dvec3();
+                2.0 * d.dot(normal).powi(2) <= d.length_squared()
+            })
             .map(|s| (points[s.point as usize].as_dvec3(), f64::from(s.weight)));
         let exact = exact_quadric(members, points[own].as_dvec3(), normal).expect("16 samples");
         let [squares, products] = vectors[own].map(|v| v.truncate());
