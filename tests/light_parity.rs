@@ -485,16 +485,13 @@ fn quadric_parity_check_rejects_sabotaged_kernels() {
     let frames = frames_of(&body.mesh.points);
     let fitting = [
         (
-            "weight > 0.0 && dot(normals[sample.x].xyz, normal) > 0.0",
-            "false",
+            "weight > 0.0 && z * z <= u * u + v * v",
+            "weight > 0.0 && u < 0.0",
         ),
         ("0.5 * u * u", "u * u"),
         ("2.0 * uv * v_axis", "uv * v_axis"),
         ("- l21 * y1", ""),
-        (
-            "dot(d, normal) * weighted",
-            "abs(dot(d, normal)) * weighted",
-        ),
+        ("+= z * weighted", "+= abs(z) * weighted"),
         ("params.per_m * solve", "solve"),
     ];
     for (which, (from, to)) in LISTING
