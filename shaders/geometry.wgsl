@@ -2,23 +2,38 @@
 // shaded exactly once, however small the triangles are.
 //
 //   base   = { u, v, octahedral normal, octahedral tangent with the handedness in its lowest bit }
-//   detail = { octahedral normal of the plane, its offset, gradient of u, gradient of v }
+//   detail = { octahedral normal of the plane, its offset [mm] and thickness, gradient of u, gradient of v }    planes
+//            { a and b, c and thickness, gradient of u, gradient of v }                                       quadrics
 //
-// The gradients [1/m] are along the tangent and the bitangent: (ds, dt) = (d.t u_t + d.b u_b, ...).
+// Gradients and bends [1/m] are along the tangent and the bitangent: (ds, dt) = (d.t u_t + d.b u_b, ...), and
+// z = 1/2 (a t^2 + 2 b t b + c b^2). Thickness is that of a layer now over that at rest: tissue keeps its volume, so it is
+// the area at rest over that now, |g_u x g_v| now over that at rest.
 //
-// Source:  Cigolla et al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT 2014.
+// Source:  do Carmo, "Differential Geometry of Curves and Surfaces" (1976), 2.5, for the area; Cigolla et al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT 2014.
 // Twin:    src/optics/pack.rs, fn octahedral
 // Parity:  tests/shading_parity.rs, fn packed_directions_match_the_cpu_twin
 // Threads: one a vertex; one a covered pixel of each triangle.
 // Units:   metres, 1/m.
-// Fails:   gradients above 65504 / m are cut.
+// Fails:   gradients and bends above 65504 / m are cut.
 
 @group(0) @binding(1) var<storage, read> positions: array<vec4f>;
 @group(0) @binding(2) var<storage, read> normals: array<vec4f>;
-@group(0) @binding(3) var<storage, read> planes: array<vec4f>;
+// A vec4f a point for planes, two for quadrics.
+@group(0) @binding(3) var<storage, read> primitives: array<vec4f>;
 
-// 1 if `planes` holds planes; the tangent plane is meant where it is 0.
-override HAS_PLANES: u32 = 0u;
+// Gradients of u along tangent and bitangent, then of v, of each vertex at rest [1/m]; read if asked for below.
+@group(0) @binding(4) var<storage, read> rest_gradients: array<vec4f>;
+
+// 1: the papers' unit frames, in which gradients stay as they were at rest however the tissue stretches.
+override UNIT_FRAMES: u32 = 0u;
+// 1: layers thin where the surface stretches.
+override FOLLOWS_VOLUME: u32 = 0u;
+
+const THICKNESS_MIN: f32 = 0.25;
+const THICKNESS_MAX: f32 = 4.0;
+
+// What `primitives` holds: 0 nothing, the tangent plane is meant; 1 planes; 2 quadrics.
+override PRIMITIVE: u32 = 0u;
 
 struct Varyings {
     @builtin(position) clip: vec4f,
@@ -26,7 +41,19 @@ struct Varyings {
     @location(1) tangent: vec4f,
     @location(2) uv: vec2f,
     @location(3) gradients: vec4f,
-    @location(4) plane: vec4f,
+    // Normal and offset of the plane, or the quadric's bends (a, b, c).
+    @location(4) primitive: vec4f,
+    @location(5) thickness: f32,
+}
+
+fn uv_area_per_m2(gradients: vec4f) -> f32 {
+    return abs(gradients.x * gradients.w - gradients.y * gradients.z);
+}
+
+fn thickness_of(now: vec4f, rest: vec4f) -> f32 {
+    let at_rest = uv_area_per_m2(rest);
+    let thickness = clamp(uv_area_per_m2(now) / max(at_rest, 1e-12), THICKNESS_MIN, THICKNESS_MAX);
+    return select(1.0, thickness, at_rest > 1e-12);
 }
 
 struct Packed {
@@ -34,8 +61,18 @@ struct Packed {
     @location(1) detail: vec4u,
 }
 
+// The matrix that is kept in two vectors, times `d`.
+fn times(squares: vec3f, products: vec3f, d: vec3f) -> vec3f {
+    return squares * d + vec3f(
+        products.x * d.y + products.y * d.z,
+        products.x * d.x + products.z * d.z,
+        products.y * d.x + products.z * d.y,
+    );
+}
+
 @vertex
 fn geometry_vertex(
+    @builtin(vertex_index) vertex: u32,
     @location(0) point: u32,
     @location(1) uv: vec2f,
     @location(2) tangent: vec4f,
@@ -44,22 +81,39 @@ fn geometry_vertex(
 ) -> Varyings {
     let normal = normals[point].xyz;
     let bitangent = tangent.w * cross(normal, tangent.xyz);
-    var plane = vec4f(normal, 0.0);
-    if HAS_PLANES != 0u {
-        plane = planes[point];
+    var primitive = vec4f(normal, 0.0);
+    if PRIMITIVE == 1u {
+        primitive = primitives[point];
+    }
+    if PRIMITIVE == 2u {
+        let squares = primitives[2u * point].xyz;
+        let products = primitives[2u * point + 1u].xyz;
+        let along = times(squares, products, tangent.xyz);
+        let across = times(squares, products, bitangent);
+        let bends = vec3f(dot(tangent.xyz, along), dot(tangent.xyz, across), dot(bitangent, across));
+        primitive = vec4f(clamp(bends, vec3f(-65504.0), vec3f(65504.0)), 0.0);
+    }
+    var gradients = vec4f(
+        dot(gradient_u, tangent.xyz),
+        dot(gradient_u, bitangent),
+        dot(gradient_v, tangent.xyz),
+        dot(gradient_v, bitangent),
+    );
+    var thickness = 1.0;
+    if FOLLOWS_VOLUME != 0u {
+        thickness = thickness_of(gradients, rest_gradients[vertex]);
+    }
+    if UNIT_FRAMES != 0u {
+        gradients = rest_gradients[vertex];
     }
     return Varyings(
         frame.clip_from_world * vec4f(positions[point].xyz, 1.0),
         normal,
         tangent,
         uv,
-        vec4f(
-            dot(gradient_u, tangent.xyz),
-            dot(gradient_u, bitangent),
-            dot(gradient_v, tangent.xyz),
-            dot(gradient_v, bitangent),
-        ),
-        plane,
+        gradients,
+        primitive,
+        thickness,
     );
 }
 
@@ -83,13 +137,19 @@ fn base_fragment(in: Varyings) -> @location(0) vec4u {
 @fragment
 fn detail_fragment(in: Varyings) -> Packed {
     let gradients = clamp(in.gradients, vec4f(-65504.0), vec4f(65504.0));
+    let offset_mm = clamp(1e3 * in.primitive.w, -65504.0, 65504.0);
+    var words = vec2u(
+        octahedral(in.primitive.xyz),
+        pack2x16float(vec2f(offset_mm, in.thickness)),
+    );
+    if PRIMITIVE == 2u {
+        words = vec2u(
+            pack2x16float(in.primitive.xy),
+            pack2x16float(vec2f(in.primitive.z, in.thickness)),
+        );
+    }
     return Packed(
         base_of(in),
-        vec4u(
-            octahedral(in.plane.xyz),
-            bitcast<u32>(in.plane.w),
-            pack2x16float(gradients.xy),
-            pack2x16float(gradients.zw),
-        ),
+        vec4u(words, pack2x16float(gradients.xy), pack2x16float(gradients.zw)),
     );
 }

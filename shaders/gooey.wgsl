@@ -19,8 +19,10 @@
 @fragment
 fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let pixel = pixel_at(at);
-    let gradients = gradients_of(textureLoad(detail_map, vec2i(at.xy), 0));
-    let shift = transmission(pixel.to_eye, pixel.relief, pixel.normal, frame.layer_distance_m);
+    let detail = textureLoad(detail_map, vec2i(at.xy), 0);
+    let gradients = gradients_of(detail);
+    let distance_m = thickness_of(detail) * frame.layer_distance_m;
+    let shift = transmission(pixel.to_eye, pixel.relief, pixel.normal, distance_m);
     let across = vec2f(dot(shift.xyz, pixel.tangent), dot(shift.xyz, pixel.bitangent));
     let uv = pixel.uv + vec2f(dot(gradients.u, across), dot(gradients.v, across));
 

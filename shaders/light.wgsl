@@ -21,7 +21,8 @@ fn way_through(world: vec3f, normal: vec3f) -> f32 {
     }
     let off = world + frame.shadow_bias_m * normal;
     let clip = frame.shadow_from_world * vec4f(off, 1.0);
-    let size = vec2f(textureDimensions(shadow_map));
+    // The map is square; those of other lights may stand to the right of it.
+    let size = vec2f(f32(textureDimensions(shadow_map).y));
     let at = (clip.xy * vec2f(0.5, -0.5) + 0.5) * size - 0.5;
     let low = floor(at);
     let share = at - low;

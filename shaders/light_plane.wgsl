@@ -1,4 +1,5 @@
-// The way of light to a point below the surface, by the planes that stand for the surface. No bindings.
+// The way of light to a point below the surface, by the planes that stand for the surface. No bindings; follows
+// pack.wgsl.
 //
 //   m = (1 - b) N + b n,   P_M = P + b h n           plane of the sample, blended from tangent to fitted
 //   s = (P_M - M).m / (m.w_in),  M = P - t w_out     signed; a plane that faces away from the light is unlit
@@ -33,4 +34,45 @@ fn way_to_light(pair: PlanePair, t: f32, blend: f32, tangent_light: f32, plane_l
     let cosine = facing * inverseSqrt(max(squared, 1e-6));
     let s = max(height, 0.0) / max(facing, 1e-3);
     return select(vec2f(0.0), vec2f(s, cosine), cosine > 1e-3);
+}
+
+// What stands for the surface here knows nothing of other parts that cast shadows.
+const SEES_SHADOWS: bool = false;
+
+// What stands for the surface over a view ray.
+struct Cover {
+    normal: vec3f,
+    plane: vec3f,
+    pair: PlanePair,
+}
+
+// Cosines of a light with both planes.
+struct Facing {
+    tangent: f32,
+    plane: f32,
+}
+
+// From what geometry.wgsl wrote for the pixel.
+fn cover_at(world: vec3f, normal: vec3f, tangent: vec3f, bitangent: vec3f, to_eye: vec3f, words: vec2u) -> Cover {
+    let plane = from_octahedral(words.x);
+    let pair = PlanePair(
+        dot(normal, plane),
+        dot(normal, to_eye),
+        dot(plane, to_eye),
+        1e-3 * unpack2x16float(words.y).x,
+    );
+    return Cover(normal, plane, pair);
+}
+
+fn facing_of(cover: Cover, light: u32, to_light: vec3f) -> Facing {
+    return Facing(dot(cover.normal, to_light), dot(cover.plane, to_light));
+}
+
+fn way_under(cover: Cover, facing: Facing, t: f32, blend: f32) -> vec2f {
+    return way_to_light(cover.pair, t, blend, facing.tangent, facing.plane);
+}
+
+// Where the view ray leaves the body again [m]: planes do not tell.
+fn exit_of(cover: Cover) -> f32 {
+    return 1e6;
 }

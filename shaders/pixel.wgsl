@@ -88,6 +88,11 @@ fn gradients_of(detail: vec4u) -> Gradients {
     return Gradients(unpack2x16float(detail.z), unpack2x16float(detail.w));
 }
 
+// How thick layers are, as a share of how thick they are at rest.
+fn thickness_of(detail: vec4u) -> f32 {
+    return unpack2x16float(detail.y).y;
+}
+
 // Everything the wet film sends to the eye: the lights' highlights and the mirrored room.
 fn wet(at: Pixel, unshadowed: f32) -> vec3f {
     var sum = vec3f(0.0);

@@ -2,7 +2,7 @@
 // often, as diffuse light; the wet film on top.
 //
 //   M(t) = P - t w_out,  t at the layers' ends (by layer), T (i/n)^2 (closed form) or T i/n (as published)
-//   T    = min(deepest layer / N.w_out, cap, exp(-8) of the clearest layer)
+//   T    = min(deepest layer / N.w_out, cap, exp(-8) of the clearest layer, the way out)
 //   (ds, dt) = (PM . g_u, PM . g_v)                        with the metric of the deformed surface
 //   L    = sum over lights and segments (medium.wgsl) + albedo diffuse / pi + film
 //
@@ -27,19 +27,21 @@ override PIECES: u32 = 1u;
 // What the march needs of a ray.
 struct Ray {
     world: vec3f,
-    normal: vec3f,
-    plane: vec3f,
     to_eye: vec3f,
-    pair: PlanePair,
+    // N.w_out
+    cos_eye: f32,
+    cover: Cover,
     uv: vec2f,
     // Texture coordinates a metre along the ray.
     drift: vec2f,
+    // The deepest boundary that the layer map can tell, as thick as layers are here [m].
+    deepest_m: f32,
 }
 
-// One light on its way along the ray: its cosines with both planes; phase function of the layers; its optical
+// One light on its way along the ray: how it meets the cover; phase function of the layers; its optical
 // depth A, with that from the eye, at the last sample, and exp(-A).
 struct Beam {
-    facing: vec2f,
+    facing: Facing,
     irradiance: vec3f,
     phases: vec4f,
     depth: vec3f,
@@ -60,7 +62,7 @@ struct March {
 
 fn bottoms_at(ray: Ray, t: f32) -> vec3f {
     let texel = textureSampleLevel(layer_map, linear_sampler, ray.uv + t * ray.drift, 0.0);
-    return frame.layer_depth_max_m * texel.rgb;
+    return ray.deepest_m * texel.rgb;
 }
 
 fn extinctions() -> Layers {
@@ -73,7 +75,8 @@ fn extinctions() -> Layers {
 }
 
 fn reach_of(ray: Ray) -> f32 {
-    return min(frame.layer_depth_max_m / max(ray.pair.tangent_eye, 0.125), frame.reach_m);
+    let deepest = ray.deepest_m / max(ray.cos_eye, 0.125);
+    return min(min(deepest, frame.reach_m), exit_of(ray.cover));
 }
 
 // Optical depth of a way to the light; beyond any eye's reach where the plane faces away.
@@ -81,16 +84,16 @@ fn light_depth(way: vec2f, bottoms: vec3f, layers: Layers) -> vec3f {
     return select(vec3f(60.0), optical_depth(way.x, way.y, bottoms, layers), way.y > 0.0);
 }
 
-fn beam_start(k: u32, ray: Ray) -> Beam {
+fn beam_start(k: u32, ray: Ray, bottoms: vec3f) -> Beam {
     let lit = light_at(k, ray.world);
-    let facing = vec2f(dot(ray.normal, lit.to_light), dot(ray.plane, lit.to_light));
+    let facing = facing_of(ray.cover, k, lit.to_light);
     let k_of_layers = vec4f(
         frame.extinction[0].w,
         frame.extinction[1].w,
         frame.extinction[2].w,
         frame.extinction[3].w,
     );
-    let depth = select(vec3f(60.0), vec3f(0.0), facing.x > 1e-3);
+    let depth = light_depth(way_under(ray.cover, facing, 0.0, 0.0), bottoms, extinctions());
     let p = phases(dot(lit.to_light, ray.to_eye), k_of_layers);
     return Beam(facing, lit.irradiance, p, depth, exp(-depth));
 }
@@ -102,7 +105,7 @@ fn turned(k: u32, ray: Ray, t: f32, beam: Beam) -> Beam {
     }
     let lit = light_at(k, ray.world - t * ray.to_eye);
     return Beam(
-        vec2f(dot(ray.normal, lit.to_light), dot(ray.plane, lit.to_light)),
+        facing_of(ray.cover, k, lit.to_light),
         lit.irradiance,
         beam.phases,
         beam.depth,
@@ -113,16 +116,16 @@ fn turned(k: u32, ray: Ray, t: f32, beam: Beam) -> Beam {
 fn march_start(ray: Ray, unshadowed: f32) -> March {
     var m: March;
     m.bottoms = bottoms_at(ray, 0.0);
-    m.beam0 = beam_start(0u, ray);
-    m.beam0.irradiance *= unshadowed;
+    m.beam0 = beam_start(0u, ray, m.bottoms);
+    m.beam0.irradiance *= select(unshadowed, 1.0, SEES_SHADOWS);
     if LIGHT_COUNT > 1u {
-        m.beam1 = beam_start(1u, ray);
+        m.beam1 = beam_start(1u, ray, m.bottoms);
     }
     if LIGHT_COUNT > 2u {
-        m.beam2 = beam_start(2u, ray);
+        m.beam2 = beam_start(2u, ray, m.bottoms);
     }
     if LIGHT_COUNT > 3u {
-        m.beam3 = beam_start(3u, ray);
+        m.beam3 = beam_start(3u, ray, m.bottoms);
     }
     return m;
 }
@@ -145,7 +148,7 @@ struct Followed {
 
 fn follow(k: u32, ray: Ray, s: Stretch, layers: Layers, last: Beam) -> Followed {
     var next = turned(k, ray, s.t, last);
-    let way = way_to_light(ray.pair, s.t, s.blend, next.facing.x, next.facing.y);
+    let way = way_under(ray.cover, next.facing, s.t, s.blend);
     next.depth = light_depth(way, s.bottoms, layers);
     let before = s.a0 + last.depth;
     let after = s.a1 + next.depth;
@@ -165,7 +168,7 @@ fn gather_layer(
     pick: vec3f,
     p: vec4f,
 ) -> vec3f {
-    let n_v = max(ray.pair.tangent_eye, 1e-3);
+    let n_v = max(ray.cos_eye, 1e-3);
     let reach = reach_of(ray);
     let is_last = all(pick == vec3f(0.0));
     var sum = vec3f(0.0);
@@ -240,7 +243,7 @@ struct Advanced {
 
 fn advance(k: u32, ray: Ray, step: Step, layers: Layers, last: Beam) -> Advanced {
     var next = turned(k, ray, step.t, last);
-    let way = way_to_light(ray.pair, step.t, step.blend, next.facing.x, next.facing.y);
+    let way = way_under(ray.cover, next.facing, step.t, step.blend);
     next.depth = light_depth(way, step.bottoms, layers);
     let sources = Layers(
         last.phases.x * frame.albedo[0].xyz,
@@ -260,7 +263,7 @@ fn advance(k: u32, ray: Ray, step: Step, layers: Layers, last: Beam) -> Advanced
 // Equal steps valued at their start, or steps that grow with depth and are integrated layer by layer.
 fn by_step(ray: Ray, unshadowed: f32) -> Gathered {
     let layers = extinctions();
-    let n_v = max(ray.pair.tangent_eye, 1e-3);
+    let n_v = max(ray.cos_eye, 1e-3);
     let reach = reach_of(ray);
     var m = march_start(ray, unshadowed);
     var upper = vec3f(0.0);
@@ -322,18 +325,21 @@ fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let pixel = pixel_at(at);
     let detail = textureLoad(detail_map, vec2i(at.xy), 0);
     let gradients = gradients_of(detail);
-    let plane = from_octahedral(detail.x);
     let drift = -vec2f(dot(gradients.u, pixel.across), dot(gradients.v, pixel.across));
-    let pair = PlanePair(
-        dot(pixel.normal, plane),
-        dot(pixel.normal, pixel.to_eye),
-        dot(plane, pixel.to_eye),
-        bitcast<f32>(detail.y),
+    let cover = cover_at(
+        pixel.world,
+        pixel.normal,
+        pixel.tangent,
+        pixel.bitangent,
+        pixel.to_eye,
+        detail.xy,
     );
-    let ray = Ray(pixel.world, pixel.normal, plane, pixel.to_eye, pair, pixel.uv, drift);
+    let cos_eye = dot(pixel.normal, pixel.to_eye);
+    let deepest_m = thickness_of(detail) * frame.layer_depth_max_m;
+    let ray = Ray(pixel.world, pixel.to_eye, cos_eye, cover, pixel.uv, drift, deepest_m);
 
     // What lies deep is seen where the ray meets it: that shift is the parallax of the vessels.
-    let sunk = 0.35 * frame.layer_depth_max_m / max(pair.tangent_eye, 0.35);
+    let sunk = 0.35 * deepest_m / max(cos_eye, 0.35);
     let deep = color_at(inner_map, pixel.uv + sunk * drift).rgb;
     let through = way_through(pixel.world, pixel.normal);
     let unshadowed = unshadowed_after(through);

@@ -13,13 +13,15 @@ use oracle::{Surface, angle_p999, degrees_between, percentile};
 use palpate::app::Session;
 use palpate::geom::SurfaceMesh;
 use palpate::geom::patch::Patches;
-use palpate::geom::plane::{LightPathMethod, carried_plane, fit_planes};
+use palpate::geom::plane::{LightPathMethod, carried_plane, exact_weighted_plane, fit_planes};
+use palpate::geom::quadric::{Quadric, exact_quadric};
+use palpate::geom::sample::{Sample, Samples};
 use palpate::geom::tangent::{
     Fans, gradient_max_per_m, point_normals, rest_normals, tangent_frames,
 };
 use palpate::gpu::{Gpu, Timer, read_buffer};
 use palpate::passes::frame::{patch_radius_m, tolerance_m};
-use palpate::passes::light_path::LightPath;
+use palpate::passes::light_path::{LightPath, LightPathKnobs};
 use palpate::passes::mesh_buffers::MeshBuffers;
 use palpate::passes::plane_carried::planes_in_frames;
 use palpate::passes::tangents::Tangents;
@@ -159,16 +161,14 @@ impl Passes {
             Gpu::headless().expect("a GPU adapter; a software one (mesa-vulkan-drivers) will do");
         let buffers = MeshBuffers::new(&gpu, &organ.mesh).expect("the surface fits");
         let tangents = Tangents::new(&gpu, &organ.mesh, &buffers).expect("the pass is built");
-        let light_path = LightPath::new(
-            &gpu,
+        let knobs = LightPathKnobs {
             method,
-            organ.radius_m,
+            radius_m: organ.radius_m,
             tolerance_m,
-            &organ.mesh,
-            &buffers,
-            &tangents,
-        )
-        .expect("the pass is built");
+            skip_m: 0.0,
+        };
+        let light_path = LightPath::new(&gpu, knobs, &organ.mesh, &buffers, &tangents)
+            .expect("the pass is built");
         Self {
             timer: Timer::new(&gpu, 4),
             gpu,
@@ -292,6 +292,98 @@ fn planes_of_a_prodded_organ_are_those_of_f64() {
             assert!(angle <= DEGREES_MAX, "{name}: {angle} degrees");
             // The tolerance is 2.5e-4 of the radius, and the plane lies within what its members may lag.
             assert!(offset <= 1e-3, "{name}: {offset} of the radius");
+        }
+    }
+}
+
+/// Errors [degrees] of the primitives of sixteen samples against the f64 fit of the same samples, p99.9: of planes the
+/// angle of their normals, of paraboloids that of the surface's normal at the rim of the patch.
+fn sampled_error(
+    organ: &Prodded,
+    samples: &Samples,
+    method: LightPathMethod,
+    points: &[Vec3],
+    passes: &Passes,
+) -> f64 {
+    let normals = surface(&organ.mesh, points).normals();
+    let at = |point: u32| points[point as usize].as_dvec3();
+    let buffer = passes
+        .light_path
+        .primitives()
+        .buffer()
+        .expect("has primitives");
+    let vectors = passes.read(buffer);
+    if method == LightPathMethod::Sampled {
+        let angles = (0..points.len()).map(|slot| {
+            let own = samples.order[slot] as usize;
+            let members: Vec<_> = samples
+                .weighing(slot)
+                .map(|s| (at(s.point), f64::from(s.weight)))
+                .collect();
+            let (exact, _) =
+                exact_weighted_plane(members.into_iter(), points[own].as_dvec3(), normals[own])
+                    .expect("16 samples");
+            degrees_between(vectors[own].truncate().as_dvec3(), exact)
+        });
+        return percentile(angles, 0.999);
+    }
+    let angles = (0..points.len()).map(|slot| {
+        let own = samples.order[slot] as usize;
+        let counts = |s: &Sample| {
+            let d = at(s.point) - points[own].as_dvec3();
+            2.0 * d.dot(normals[own]).powi(2) <= d.length_squared()
+        };
+        let members = samples.weighing(slot).filter(counts);
+        let members = members.map(|s| (at(s.point), f64::from(s.weight)));
+        let exact =
+            exact_quadric(members, points[own].as_dvec3(), normals[own]).expect("16 samples");
+        let quadric = Quadric {
+            squares: vectors[2 * own].truncate(),
+            products: vectors[2 * own + 1].truncate(),
+        };
+        let apart = [Vec3::X, Vec3::Y, Vec3::Z]
+            .map(|axis| (quadric.times(axis).as_dvec3() - exact * axis.as_dvec3()).length())
+            .into_iter()
+            .fold(0.0, f64::max);
+        (apart * f64::from(organ.radius_m)).to_degrees()
+    });
+    percentile(angles, 0.999)
+}
+
+#[test]
+fn sampled_planes_and_quadrics_of_a_prodded_organ_are_those_of_f64() {
+    for organ in organs() {
+        let mesh = &organ.mesh;
+        let at_rest = rest_normals(mesh, &Fans::new(mesh));
+        let patches = Patches::new(&mesh.points, &at_rest, organ.radius_m);
+        let even = Samples::new(&mesh.points, &patches);
+        let middle = even.clone().weighted_to_the_middle(&mesh.points);
+        for (method, samples) in [
+            (LightPathMethod::Sampled, &even),
+            (LightPathMethod::Quadric, &middle),
+        ] {
+            let mut passes = Passes::new(organ, method, organ.tolerance_m);
+            for frame in 1..=FRAMES {
+                passes.frame(organ.at(frame));
+                if frame % 10 == 0 {
+                    // Uploads that wait for the GPU would pile up.
+                    passes.gpu.wait();
+                }
+                if COMPARED.contains(&frame) {
+                    let angle = sampled_error(organ, samples, method, organ.at(frame), &passes);
+                    println!(
+                        "{}, frame {frame}: {} p99.9 {angle:.2e} degrees",
+                        organ.name,
+                        method.name()
+                    );
+                    assert!(
+                        angle <= DEGREES_MAX,
+                        "{} of {}: {angle} degrees",
+                        method.name(),
+                        organ.name
+                    );
+                }
+            }
         }
     }
 }

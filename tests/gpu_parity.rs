@@ -16,7 +16,7 @@ use palpate::geom::tangent::{
     tangent_frames,
 };
 use palpate::gpu::{Gpu, Timer, join, read_buffer};
-use palpate::passes::light_path::{LightPath, RefitCounts};
+use palpate::passes::light_path::{LightPath, LightPathKnobs, RefitCounts};
 use palpate::passes::mesh_buffers::MeshBuffers;
 use palpate::passes::plane_carried::{PlaneCarried, planes_in_frames};
 use palpate::passes::plane_full::PlaneFull;
@@ -106,16 +106,13 @@ impl Body {
 
     fn light_path(&self, gpu: &Gpu, method: LightPathMethod, tolerance_m: f32) -> LightPath {
         let (buffers, tangents) = (&self.buffers, &self.tangents);
-        LightPath::new(
-            gpu,
+        let knobs = LightPathKnobs {
             method,
-            RADIUS_M,
+            radius_m: RADIUS_M,
             tolerance_m,
-            &self.mesh,
-            buffers,
-            tangents,
-        )
-        .expect("the pass is built")
+            skip_m: 0.0,
+        };
+        LightPath::new(gpu, knobs, &self.mesh, buffers, tangents).expect("the pass is built")
     }
 
     /// Angle [degrees] and offset difference, as a share of the radius, of each plane against the

@@ -4,11 +4,16 @@
 
 use palpate::geom::moments::PatchSums;
 use palpate::gpu::{Wgsl, join};
+use palpate::passes::depth_maps::{DepthMaps, LightViews};
 use palpate::passes::geometry::Geometry;
+use palpate::passes::light_path::CoverKind;
 use palpate::passes::lightmap::{BlurUniform, LightMap};
+use palpate::passes::moved_leaves::{self, ListedParams, MovedLeaves};
 use palpate::passes::plane_carried::{self, PlaneCarried};
 use palpate::passes::plane_full::{self, PlaneFull};
 use palpate::passes::plane_incremental::{MovedParams, PlaneIncremental, UpdateParams};
+use palpate::passes::plane_sampled::PlaneSampled;
+use palpate::passes::quadric::Quadrics;
 use palpate::passes::shadow::Shadow;
 use palpate::passes::surface::Surface;
 use palpate::passes::tangents::{NormalsParams, Tangents, TangentsParams};
@@ -29,13 +34,34 @@ fn shaders() -> Vec<(&'static str, &'static [Wgsl])> {
         ("full planes, fit", PlaneFull::FIT_WGSL),
         ("incremental planes, moved", PlaneIncremental::MOVED_WGSL),
         ("incremental planes, update", PlaneIncremental::UPDATE_WGSL),
+        ("moved leaves", MovedLeaves::WGSL),
+        ("sampled planes", PlaneSampled::WGSL),
+        ("quadrics", Quadrics::WGSL),
         ("geometry", Geometry::WGSL),
         ("shadow", Shadow::WGSL),
         ("light map", LightMap::WGSL),
         ("blur", LightMap::BLUR_WGSL),
-        ("plain", Surface::wgsl(SurfaceKind::Plain)),
-        ("subsurface", Surface::wgsl(SurfaceKind::Subsurface)),
-        ("gooey", Surface::wgsl(SurfaceKind::Gooey)),
+        (
+            "plain",
+            Surface::wgsl(SurfaceKind::Plain, CoverKind::Planes),
+        ),
+        (
+            "subsurface",
+            Surface::wgsl(SurfaceKind::Subsurface, CoverKind::Planes),
+        ),
+        (
+            "subsurface below quadrics",
+            Surface::wgsl(SurfaceKind::Subsurface, CoverKind::Quadrics),
+        ),
+        ("depth maps", DepthMaps::WGSL),
+        (
+            "subsurface below depth maps",
+            Surface::wgsl(SurfaceKind::Subsurface, CoverKind::DepthMaps),
+        ),
+        (
+            "gooey",
+            Surface::wgsl(SurfaceKind::Gooey, CoverKind::Planes),
+        ),
         ("tone map", ToneMap::WGSL),
         ("tools", Tools::WGSL),
     ]
@@ -86,7 +112,19 @@ fn mirrors() -> Vec<Mirror> {
             }
         )
     };
-    let shading = Surface::wgsl(SurfaceKind::Plain);
+    let listed = |wgsl| {
+        mirror!(
+            wgsl,
+            "Params",
+            ListedParams {
+                slot_count,
+                per_m,
+                skip_m,
+                pad0
+            }
+        )
+    };
+    let shading = Surface::wgsl(SurfaceKind::Plain, CoverKind::Planes);
     vec![
         mirror!(
             Tangents::NORMALS_WGSL,
@@ -121,6 +159,27 @@ fn mirrors() -> Vec<Mirror> {
         full(PlaneFull::SORT_WGSL),
         full(PlaneFull::FIT_WGSL),
         moved(PlaneIncremental::MOVED_WGSL),
+        mirror!(
+            MovedLeaves::WGSL,
+            "Params",
+            moved_leaves::MovedParams {
+                slot_count,
+                tolerance_squared_m2,
+                pad0,
+                pad1
+            }
+        ),
+        listed(PlaneSampled::WGSL),
+        listed(Quadrics::WGSL),
+        mirror!(
+            Surface::wgsl(SurfaceKind::Subsurface, CoverKind::DepthMaps),
+            "LightViews",
+            LightViews {
+                clip_from_world,
+                world_from_clip,
+                slack_m
+            }
+        ),
         mirror!(
             PlaneIncremental::UPDATE_WGSL,
             "Params",

@@ -412,6 +412,69 @@ fn each_light_path_method_makes_the_planes_that_it_promises() {
     assert!(angle_p999(&tangent_normals, &tangent_dump.now.normals()) <= DEGREES_MAX);
 }
 
+#[test]
+fn methods_of_sixteen_samples_and_depth_maps_dump_what_they_say() {
+    let run = |method: &str| {
+        let run = Run::new(
+            &format!("method-{method}"),
+            &format!(
+                "liver --size 80x60 --frames {PRESSED} --dump {PRESSED} --set light_path.method={method}"
+            ),
+        );
+        let names: Vec<String> = run.summary()["passes"]
+            .as_array()
+            .expect("passes are a list")
+            .iter()
+            .map(|pass| pass["name"].as_str().expect("has a name").to_owned())
+            .collect();
+        (Dump::read(&run.out, PRESSED), names)
+    };
+    let (full, _) = run("full");
+    let full = full.primitives();
+    let (sampled, names) = run("sampled");
+    assert!(names.contains(&"planes-sampled".to_owned()), "{names:?}");
+    let sampled = sampled.primitives();
+    let apart = sampled
+        .iter()
+        .zip(&full)
+        .map(|(a, b)| degrees_between(a.0, b.0));
+    // Sixteen samples of about 200, on a pressed surface: half a degree at most for most.
+    assert!(percentile(apart, 0.5) < 0.5);
+
+    let (quadric, names) = run("quadric");
+    assert!(names.contains(&"quadrics".to_owned()), "{names:?}");
+    let rows = quadric.columns::<8>("primitives");
+    let normals = quadric.columns::<3>("normals");
+    let mut bent = 0;
+    for ([xx, yy, zz, _, xy, xz, yz, _], [x, y, z]) in rows.into_iter().zip(normals) {
+        let n = DVec3::new(x, y, z);
+        let q = |d: DVec3| {
+            DVec3::new(
+                xx * d.x + xy * d.y + xz * d.z,
+                xy * d.x + yy * d.y + yz * d.z,
+                xz * d.x + yz * d.y + zz * d.z,
+            )
+        };
+        let size = q(DVec3::X).length() + q(DVec3::Y).length() + q(DVec3::Z).length();
+        assert!(size.is_finite());
+        // The normal that was dumped may lie within the tolerance of the one that was fitted with.
+        assert!(
+            q(n).length() <= 0.01 * size + 1e-3,
+            "{} of {size}",
+            q(n).length()
+        );
+        bent += usize::from(size > 1.0);
+    }
+    assert!(bent > 100, "a liver is bent: {bent} vertices are");
+
+    let (_, names) = run("depth-map");
+    assert!(names.contains(&"depth-maps".to_owned()), "{names:?}");
+    assert!(
+        !names.contains(&"shadow".to_owned()),
+        "one map serves both: {names:?}"
+    );
+}
+
 // What is drawn.
 
 /// A liver that sags under its weight, with no tool before it.

@@ -5,14 +5,18 @@
 
 use glam::{Vec3, Vec4};
 use palpate::geom::SurfaceMesh;
+use palpate::geom::plane::LightPathMethod;
 use palpate::gpu::{
     Binding, Gpu, Kernel, Wgsl, join, read_buffer, read_texture_rgba16f, storage, uniform,
 };
+use palpate::optics::light_entry;
 use palpate::optics::light_plane::{PlanePair, way_to_light};
-use palpate::optics::march::{Ray, Rule, march, reach_m};
+use palpate::optics::light_quadric::{self, Aim, Bend};
+use palpate::optics::march::{Cover, Ray, Rule, march, reach_m};
 use palpate::optics::{Layer, blur, film, layers, medium, pack, tone};
 use palpate::passes::draw::Target;
 use palpate::passes::frame::FramePasses;
+use palpate::passes::light_path::CoverKind;
 use palpate::passes::lightmap::{BlurUniform, LightMap};
 use palpate::passes::surface::Surface;
 use palpate::passes::view::{FrameUniform, View};
@@ -293,20 +297,153 @@ fn light_plane_difference(gpu: &Gpu, source: &str) -> f32 {
 
 #[test]
 fn light_planes_match_the_cpu_twin() {
-    let difference = light_plane_difference(&gpu(), &join(wgsl!["light_plane.wgsl"]));
+    let difference = light_plane_difference(&gpu(), &join(wgsl!["pack.wgsl", "light_plane.wgsl"]));
     // A way that starts on the plane is a difference of lengths: 1e-3 of 10 micrometres is 10 nanometres.
     assert!(difference < 1e-3, "differ by {difference}");
 }
 
 #[test]
 fn light_plane_parity_check_rejects_an_offset_without_its_sign() {
-    let source = join(wgsl!["light_plane.wgsl"]);
+    let source = join(wgsl!["pack.wgsl", "light_plane.wgsl"]);
     let source = sabotaged(
         &source,
         "blend * pair.offset *",
         "blend * abs(pair.offset) *",
     );
     assert!(light_plane_difference(&gpu(), &source) > 0.1);
+}
+
+// Light quadrics.
+
+/// Worst difference of ways and cosines. Where light grazes, whether it enters at all hangs on the last bit: those
+/// cases are passed over.
+fn light_quadric_difference(gpu: &Gpu, source: &str) -> f32 {
+    // bends, t | to eye | to light
+    let cases: Vec<_> = cases(|n| {
+        let bends = Vec3::from_array([(); 3].map(|()| n.between(-60.0, 60.0)));
+        let upwards = |d: Vec3| Vec3::new(d.x, d.y, d.z.abs());
+        [
+            bends.extend(n.between(0.0, 0.006)),
+            upwards(n.direction()).extend(0.0),
+            n.direction().extend(0.0),
+            Vec4::ZERO,
+        ]
+    });
+    let ways = |[a, b, c, _]: &[Vec4; 4]| {
+        let bend = Bend {
+            bends: a.truncate(),
+            to_eye: b.truncate(),
+        };
+        let aim = Aim {
+            to_light: c.truncate(),
+        };
+        light_quadric::way_to_light(&bend, &aim, a.w).unwrap_or((0.0, 0.0))
+    };
+    let grazing = |case: &[Vec4; 4]| (0.0..0.05).contains(&ways(case).1);
+    let unlit = |case: &[Vec4; 4]| {
+        // Surely unlit: still so with a light a little higher or lower.
+        [-0.02, 0.0, 0.02].iter().all(|turn| {
+            let mut turned = *case;
+            turned[2] = (case[2].truncate() + *turn * Vec3::Z)
+                .normalize()
+                .extend(0.0);
+            ways(&turned).1 == 0.0
+        })
+    };
+    let cases: Vec<_> = cases
+        .into_iter()
+        .filter(|case| !grazing(case) || unlit(case))
+        .collect();
+    assert!(
+        cases.len() > 300,
+        "most cases are clear ones: {}",
+        cases.len()
+    );
+    let body = "let bend = bend_of(a.xyz, b.xyz);
+        let way = way_to_light(bend, aim_of(bend, c.xyz), a.w);
+        results[i] = vec4f(way, 0.0, 0.0);";
+    let twin: Vec<Vec4> = cases
+        .iter()
+        .map(|case| {
+            let (s, cosine) = ways(case);
+            Vec4::new(s, cosine, 0.0, 0.0)
+        })
+        .collect();
+    worst(&call(gpu, source, body, &cases), &twin, 1e-5)
+}
+
+#[test]
+fn light_quadrics_match_the_cpu_twin() {
+    let source = join(wgsl!["pack.wgsl", "light_quadric.wgsl"]);
+    let difference = light_quadric_difference(&gpu(), &source);
+    // As with planes; and a root of a small difference doubles its rounding.
+    assert!(difference < 2e-3, "differ by {difference}");
+}
+
+#[test]
+fn light_quadric_parity_check_rejects_the_other_root_and_a_lost_bend() {
+    let gpu = gpu();
+    let source = join(wgsl!["pack.wgsl", "light_quadric.wgsl"]);
+    for (from, to) in [
+        ("(root - rise)", "(root + rise)"),
+        ("- 2.0 * depth * aim.light_light", ""),
+        ("+ t * aim.eye_light", "- t * aim.eye_light"),
+        ("0.5 * t * t * bend.eye_eye", "t * t * bend.eye_eye"),
+        ("- t * bend.of_eye", ""),
+    ] {
+        let difference = light_quadric_difference(&gpu, &sabotaged(&source, from, to));
+        assert!(difference > 0.05, "{to} went unnoticed: {difference}");
+    }
+}
+
+// Entries read from depth maps.
+
+fn entry_difference(gpu: &Gpu, source: &str) -> f32 {
+    // entry, slack | normal | at | to light
+    let cases = cases(|n| {
+        let near = |n: &mut Numbers| 0.01 * n.direction() * n.next();
+        [
+            near(n).extend(n.between(0.0, 0.002)),
+            n.direction().extend(0.0),
+            near(n).extend(0.0),
+            n.direction().extend(0.0),
+        ]
+    });
+    let body = "results[i] = vec4f(way_from_entry(a.xyz, b.xyz, c.xyz, d.xyz, a.w), 0.0, 0.0);";
+    let twin: Vec<Vec4> = cases
+        .iter()
+        .map(|[a, b, c, d]| {
+            let [entry, normal, at, to_light] = [a, b, c, d].map(|v| v.truncate());
+            let way = light_entry::way_from_entry(entry, normal, at, to_light, a.w);
+            let (s, cosine) = way.unwrap_or((0.0, 0.0));
+            Vec4::new(s, cosine, 0.0, 0.0)
+        })
+        .collect();
+    worst(&call(gpu, source, body, &cases), &twin, 1e-4)
+}
+
+#[test]
+fn ways_from_entries_match_the_cpu_twin() {
+    let difference = entry_difference(&gpu(), &join(wgsl!["light_entry.wgsl"]));
+    assert!(difference < TOLERANCE, "differ by {difference}");
+}
+
+#[test]
+fn entry_parity_check_rejects_a_cut_across_the_light_and_a_lost_slack() {
+    let gpu = gpu();
+    let source = join(wgsl!["light_entry.wgsl"]);
+    for (from, to) in [
+        (
+            "dot(entry - at, normal) / cosine",
+            "dot(entry - at, to_light)",
+        ),
+        ("s > -slack_m", "s > 0.0"),
+    ] {
+        assert!(
+            entry_difference(&gpu, &sabotaged(&source, from, to)) > 0.1,
+            "{to}"
+        );
+    }
 }
 
 // Parallax.
@@ -562,7 +699,7 @@ fn far_light(toward: Vec3) -> PlacedLight {
 }
 
 /// Worst difference of the march by `rule` from its twin, relative to the brightest case.
-fn march_difference(gpu: &Gpu, source: &str, rule: Rule, samples: u32) -> f32 {
+fn march_difference(gpu: &Gpu, source: &str, cover: CoverKind, rule: Rule, samples: u32) -> f32 {
     let section = section();
     let to_light = Vec3::new(0.3, 0.5, 0.8).normalize();
     let view = View {
@@ -597,6 +734,22 @@ fn march_difference(gpu: &Gpu, source: &str, rule: Rule, samples: u32) -> f32 {
             "override PIECES: u32 = 1u;",
             &format!("const PIECES: u32 = {}u;", samples.div_ceil(4)),
         );
+    // The last two vectors of a case are the plane, or the bends and the tangent of the paraboloid.
+    let make_cover = match cover {
+        CoverKind::Planes => {
+            "let pair = PlanePair(
+                dot(normal, plane.xyz), dot(normal, to_eye), dot(plane.xyz, to_eye), plane.w);
+            let cover = Cover(normal, plane.xyz, pair);"
+        }
+        CoverKind::DepthMaps => unreachable!("its entries are read"),
+        CoverKind::Quadrics => {
+            "let tangent = cases[4u * i + 3u].xyz;
+            let bitangent = cross(normal, tangent);
+            let bend = bend_of(1e3 * plane.www * vec3f(50.0, 20.0, 90.0),
+                in_frame(tangent, bitangent, normal, to_eye));
+            let cover = Cover(tangent, bitangent, normal, bend);"
+        }
+    };
     let kernel = format!(
         "{source}
         @group(0) @binding(11) var<storage, read> cases: array<vec4f>;
@@ -608,9 +761,9 @@ fn march_difference(gpu: &Gpu, source: &str, rule: Rule, samples: u32) -> f32 {
             let normal = cases[4u * i].xyz;
             let plane = cases[4u * i + 1u];
             let to_eye = cases[4u * i + 2u].xyz;
-            let pair = PlanePair(
-                dot(normal, plane.xyz), dot(normal, to_eye), dot(plane.xyz, to_eye), plane.w);
-            let ray = Ray(vec3f(0.0), normal, plane.xyz, to_eye, pair, vec2f(0.5), vec2f(0.0));
+            {make_cover}
+            let ray = Ray(vec3f(0.0), to_eye, dot(normal, to_eye), cover, vec2f(0.5), vec2f(0.0),
+                frame.layer_depth_max_m);
             let got = single_scattering(ray, 1.0);
             results[i] = vec4f(got.upper + got.lower, 0.0);
         }}"
@@ -629,22 +782,12 @@ fn march_difference(gpu: &Gpu, source: &str, rule: Rule, samples: u32) -> f32 {
             normal.extend(0.0),
             plane.extend(n.between(-5e-4, 5e-4)),
             to_eye.extend(0.0),
-            Vec4::ZERO,
+            normal.any_orthonormal_vector().extend(0.0),
         ]
     });
     let twin: Vec<Vec4> = cases
         .iter()
-        .map(|[a, b, c, _]| {
-            twin_of_march(
-                a.truncate(),
-                *b,
-                c.truncate(),
-                to_light,
-                &section,
-                rule,
-                samples,
-            )
-        })
+        .map(|case| twin_of_march(case, cover, to_light, &section, rule, samples))
         .collect();
 
     let rgba8 = wgpu::TextureFormat::Rgba8Unorm;
@@ -700,35 +843,55 @@ fn march_difference(gpu: &Gpu, source: &str, rule: Rule, samples: u32) -> f32 {
 }
 
 fn twin_of_march(
-    normal: Vec3,
-    plane: Vec4,
-    to_eye: Vec3,
+    [normal, plane, to_eye, tangent]: &[Vec4; 4],
+    cover: CoverKind,
     to_light: Vec3,
     section: &SurfaceSection,
     rule: Rule,
     samples: u32,
 ) -> Vec4 {
+    let [normal, plane_normal, to_eye, tangent] =
+        [normal, plane, to_eye, tangent].map(|v| v.truncate());
     let layers: [Layer; 4] = section.layers.map(Layer::from);
     let clearest = layers
         .iter()
         .map(|layer| layer.extinction_per_m().min_element())
         .fold(f32::INFINITY, f32::min);
-    let plane_normal = plane.truncate();
-    let ray = Ray {
-        pair: PlanePair {
-            normals: normal.dot(plane_normal),
-            tangent_eye: normal.dot(to_eye),
-            plane_eye: plane_normal.dot(to_eye),
-            offset_m: plane.w,
+    let in_frame = |d: Vec3| {
+        let bitangent = normal.cross(tangent);
+        Vec3::new(tangent.dot(d), bitangent.dot(d), normal.dot(d))
+    };
+    let cover = match cover {
+        CoverKind::Planes => Cover::Planes {
+            pair: PlanePair {
+                normals: normal.dot(plane_normal),
+                tangent_eye: normal.dot(to_eye),
+                plane_eye: plane_normal.dot(to_eye),
+                offset_m: plane.w,
+            },
+            tangent_light: normal.dot(to_light),
+            plane_light: plane_normal.dot(to_light),
         },
-        tangent_light: normal.dot(to_light),
-        plane_light: plane_normal.dot(to_light),
+        CoverKind::DepthMaps => unreachable!("its entries are read"),
+        CoverKind::Quadrics => Cover::Quadric {
+            bend: Bend {
+                bends: 1e3 * plane.w * Vec3::new(50.0, 20.0, 90.0),
+                to_eye: in_frame(to_eye),
+            },
+            aim: Aim {
+                to_light: in_frame(to_light),
+            },
+        },
+    };
+    let reach = reach_m(
+        section.layer_depth_max_m,
+        normal.dot(to_eye),
+        8.0 / clearest,
+    );
+    let ray = Ray {
+        cover,
         light_eye: to_light.dot(to_eye),
-        reach_m: reach_m(
-            section.layer_depth_max_m,
-            normal.dot(to_eye),
-            8.0 / clearest,
-        ),
+        reach_m: reach.min(cover.exit_m()),
     };
     let [r, g, b, _] = BOUNDARIES.map(|byte| section.layer_depth_max_m * f32::from(byte) / 255.0);
     march(&ray, &layers, |_| Vec3::new(r, g, b), samples, rule).extend(0.0)
@@ -737,21 +900,23 @@ fn twin_of_march(
 #[test]
 fn march_matches_the_cpu_twin() {
     let gpu = gpu();
-    let source = join(Surface::wgsl(SurfaceKind::Subsurface));
-    for (rule, samples) in [
-        (Rule::ByLayer, 4),
-        (Rule::ByLayer, 8),
-        (Rule::ClosedForm, 1),
-        (Rule::ClosedForm, 10),
-        (Rule::Published, 23),
-    ] {
-        let difference = march_difference(&gpu, &source, rule, samples);
-        // Sums of differences of exponentials. (A published sample on a boundary would be in either layer: 23
-        // equal steps have none there.)
-        assert!(
-            difference < 2e-3,
-            "{rule:?} with {samples}: differ by {difference}"
-        );
+    for cover in [CoverKind::Planes, CoverKind::Quadrics] {
+        let source = join(Surface::wgsl(SurfaceKind::Subsurface, cover));
+        for (rule, samples) in [
+            (Rule::ByLayer, 4),
+            (Rule::ByLayer, 8),
+            (Rule::ClosedForm, 1),
+            (Rule::ClosedForm, 10),
+            (Rule::Published, 23),
+        ] {
+            let difference = march_difference(&gpu, &source, cover, rule, samples);
+            // Sums of differences of exponentials. (A published sample on a boundary would be in either layer: 23
+            // equal steps have none there.)
+            assert!(
+                difference < 2e-3,
+                "{cover:?}, {rule:?} with {samples}: differ by {difference}"
+            );
+        }
     }
 }
 
@@ -759,15 +924,26 @@ fn march_matches_the_cpu_twin() {
 fn march_parity_check_rejects_planes_blended_the_wrong_way_round() {
     // François' Algorithm 2 against his eq. 9.
     let source = sabotaged(
-        &join(Surface::wgsl(SurfaceKind::Subsurface)),
+        &join(Surface::wgsl(SurfaceKind::Subsurface, CoverKind::Planes)),
         "let rest = 1.0 - blend;",
         "let rest = blend;",
     );
-    let difference = march_difference(&gpu(), &source, Rule::ClosedForm, 10);
+    let difference = march_difference(&gpu(), &source, CoverKind::Planes, Rule::ClosedForm, 10);
     assert!(
         difference > 0.02,
         "swapped planes went unnoticed: {difference}"
     );
+}
+
+#[test]
+fn march_parity_check_rejects_a_march_that_goes_on_outside_the_body() {
+    let source = sabotaged(
+        &join(Surface::wgsl(SurfaceKind::Subsurface, CoverKind::Quadrics)),
+        "return max(exit, 1e-6);",
+        "return 1e6;",
+    );
+    let difference = march_difference(&gpu(), &source, CoverKind::Quadrics, Rule::ClosedForm, 10);
+    assert!(difference > 0.02, "an exit went unnoticed: {difference}");
 }
 
 // Whole frames.
@@ -813,6 +989,67 @@ fn ball(gpu: &Gpu, kind: &str, sets: &[&str], light: &str) -> Vec<Vec4> {
         .chunks_exact(4)
         .map(Vec4::from_slice)
         .collect()
+}
+
+#[test]
+fn the_lit_side_is_bright_by_every_light_path() {
+    let gpu = gpu();
+    for method in LightPathMethod::ALL {
+        let method = format!("light_path.method={}", method.name());
+        let sets = [method.as_str(), "light_path.radius_m=0.01"];
+        for light in [
+            "toward = [1.0, 0.2, 0.0]\nshadow = true",
+            "toward = [1.0, 0.2, 0.0]",
+            "at_m = [0.12, 0.0, 0.0]",
+        ] {
+            let pixels = ball(&gpu, "subsurface", &sets, light);
+            assert!(pixels.iter().all(|pixel| pixel.is_finite()), "{method}");
+            let [left, right] = halves(&pixels);
+            assert!(right > 3.0 * left, "{method}, {light}: {left} and {right}");
+        }
+    }
+}
+
+#[test]
+fn below_a_ball_quadrics_come_nearer_than_planes_to_what_depth_maps_read() {
+    let gpu = gpu();
+    // Light that scattered once, alone, in tissue clear enough for the ball to be seen bent.
+    let by = |method: &str| {
+        let method = format!("light_path.method={method}");
+        let sets = [
+            method.as_str(),
+            "light_path.radius_m=0.015",
+            "surface.multiple_scattering=0.0",
+            "surface.wetness=0.0",
+            "surface.color_blend=0.0",
+            "surface.samples=16",
+            "surface.layer.0.absorption_per_m=[5.0, 10.0, 20.0]",
+            "surface.layer.1.absorption_per_m=[5.0, 10.0, 20.0]",
+            "surface.layer.2.absorption_per_m=[5.0, 10.0, 20.0]",
+            "surface.layer.3.absorption_per_m=[5.0, 10.0, 20.0]",
+            "surface.layer_depth_max_m=0.03",
+        ];
+        ball(&gpu, "subsurface", &sets, "toward = [0.7, 0.3, 0.6]")
+    };
+    let read = by("depth-map");
+    let error = |method: &str| {
+        let [sum, norm] = by(method)
+            .iter()
+            .zip(&read)
+            .fold([0.0_f32; 2], |[sum, norm], (a, b)| {
+                [
+                    sum + (*a - *b).length_squared(),
+                    norm + b.truncate().length_squared(),
+                ]
+            });
+        (sum / norm).sqrt()
+    };
+    let [quadric, full, tangent] = ["quadric", "full", "tangent"].map(error);
+    println!("from depth maps: quadric {quadric:.4}, full {full:.4}, tangent {tangent:.4}");
+    assert!(
+        quadric < 0.6 * full && quadric < 0.6 * tangent,
+        "{quadric}, {full}, {tangent}"
+    );
 }
 
 /// Mean brightness of the covered pixels of the left and the right half.

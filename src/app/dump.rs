@@ -46,12 +46,13 @@ pub fn write_dump(folder: &Path, session: &Session, renderer: &Renderer) -> Resu
         &by_vertex(&|p| drawn.normals[p][..3].to_vec()),
     )?;
     floats("tangents.npy", 4, drawn.tangents.as_flattened())?;
-    let planes = drawn.planes.as_ref();
+    let primitives = drawn.primitives.as_ref();
+    let columns = primitives.map_or(4, |(columns, _)| *columns);
     floats(
         "primitives.npy",
-        4,
-        &by_vertex(&|p| match planes {
-            Some(planes) => planes[p].to_vec(),
+        columns as u64,
+        &by_vertex(&|p| match primitives {
+            Some((_, vectors)) => vectors.as_flattened()[columns * p..columns * (p + 1)].to_vec(),
             None => {
                 let [x, y, z, _] = drawn.normals[p];
                 vec![x, y, z, 0.0]
@@ -77,7 +78,7 @@ pub fn write_dump(folder: &Path, session: &Session, renderer: &Renderer) -> Resu
         &[height, width],
         &renderer.depth()?,
     )?;
-    let text = serde_json::to_string_pretty(&description(session, renderer, planes.is_some()))
+    let text = serde_json::to_string_pretty(&description(session, renderer, primitives.is_some()))
         .expect("a description has string keys");
     Ok(write(&folder.join("dump.json"), text.as_bytes())?)
 }
@@ -86,6 +87,13 @@ const FITTED: &str = "plane { x : normal . (x - position) = offset_m }: least sq
                       oriented with the normal";
 const TANGENT: &str = "plane { x : normal . (x - position) = 0 }: the tangent plane; the shaders of this \
                        scene read no fitted one";
+
+const QUADRIC: &str = "paraboloid { x : normal . d = d . Q d / 2, d = x - position }, Q symmetric [1/m] in world \
+                       axes: least squares over 16 samples of the patch, weighted to the middle";
+const PLANE_COLUMNS: [&str; 4] = ["normal_x", "normal_y", "normal_z", "offset_m"];
+const QUADRIC_COLUMNS: [&str; 8] = [
+    "q_xx", "q_yy", "q_zz", "zero", "q_xy", "q_xz", "q_yz", "zero",
+];
 
 fn description(session: &Session, renderer: &Renderer, fitted: bool) -> serde_json::Value {
     let scene = &session.scene;
@@ -96,6 +104,7 @@ fn description(session: &Session, renderer: &Renderer, fitted: bool) -> serde_js
         up: orbit.up,
         fov_y: orbit.fov_y,
     };
+    let quadric = effective_method(scene) == Some(LightPathMethod::Quadric);
     let [width, height] = renderer.size();
     let aspect = width as f32 / height as f32;
     let lights: Vec<_> = placed_lights(scene, &session.rest)
@@ -135,15 +144,15 @@ fn description(session: &Session, renderer: &Renderer, fitted: bool) -> serde_js
             "radius_m": fitted.then(|| patch_radius_m(scene)),
         },
         "primitives": {
-            "columns": ["normal_x", "normal_y", "normal_z", "offset_m"],
-            "meaning": if fitted { FITTED } else { TANGENT },
+            "columns": if quadric { &QUADRIC_COLUMNS[..] } else { &PLANE_COLUMNS[..] },
+            "meaning": if quadric { QUADRIC } else if fitted { FITTED } else { TANGENT },
             "patch": "the points within radius_m of the point in rest_positions whose rest normals are not opposed (dot > 0), at least the 16 nearest; membership is symmetric; each point counts once though it may have several vertices (point_of)",
         },
         "arrays": {
             "positions": "(vertices, 3) f32 m", "rest_positions": "(vertices, 3) f32 m",
             "normals": "(vertices, 3) f32", "tangents": "(vertices, 4) f32, handedness last",
             "uv": "(vertices, 2) f32, v downwards", "point_of": "(vertices,) u32",
-            "triangles": "(triangles, 3) u32", "primitives": "(vertices, 4) f32",
+            "triangles": "(triangles, 3) u32", "primitives": "(vertices, columns) f32",
             "radiance": "(height, width, 3) f32 linear, W/(m2 sr), rounded to half floats by the target",
             "depth": "(height, width) f32, 0 near to 1 far",
         },

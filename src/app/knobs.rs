@@ -1,7 +1,7 @@
 //! The live knobs of a surface, those of Norberg's figure 15 among them.
 
 use super::panel::PanelAsk;
-use crate::scene::{Quadrature, SurfaceKind, SurfaceSection};
+use crate::scene::{Quadrature, SurfaceKind, SurfaceSection, UvMetric};
 use egui::{ComboBox, Slider, Ui};
 
 /// Shows the knobs of the surface's own kind; returns what a change needs.
@@ -12,12 +12,28 @@ pub fn surface(ui: &mut Ui, surface: &mut SurfaceSection) -> Option<PanelAsk> {
         SurfaceKind::Subsurface => subsurface(ui, surface),
         SurfaceKind::Gooey => gooey(ui, surface),
     }
+    if surface.kind != SurfaceKind::Plain {
+        ui.horizontal(|ui| {
+            for metric in [UvMetric::Deformed, UvMetric::Unit] {
+                ui.selectable_value(&mut surface.uv_metric, metric, metric.name());
+            }
+            ui.label("texture metric");
+        });
+        ui.checkbox(
+            &mut surface.thickness_follows_volume,
+            "layers keep their volume",
+        );
+    }
     ui.add(Slider::new(&mut surface.relief, 0.0..=2.0).text("relief"));
     ui.add(Slider::new(&mut surface.roughness, 0.05..=0.8).text("roughness"));
     ui.add(Slider::new(&mut surface.wetness, 0.0..=2.0).text("wetness"));
     ui.add(Slider::new(&mut surface.exposure, 0.1..=4.0).text("exposure"));
-    let rebuilt =
-        |s: &SurfaceSection| (s.samples, s.quadrature, s.blur_passes, s.light_map_size_px);
+    let rebuilt = |s: &SurfaceSection| {
+        (
+            (s.samples, s.quadrature, s.blur_passes, s.light_map_size_px),
+            (s.uv_metric, s.thickness_follows_volume),
+        )
+    };
     if rebuilt(surface) != rebuilt(&before) {
         Some(PanelAsk::Rebuild)
     } else if *surface != before {

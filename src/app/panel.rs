@@ -324,6 +324,14 @@ fn light_path_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAs
                 }
             }
         });
+    if *method == LightPathMethod::Sampled {
+        let skip = &mut session.scene.light_path.skip_optical_depth;
+        let slider = Slider::new(skip, 0.0..=0.5).text("optical depth passed over");
+        // Only when let go: each change builds the passes anew.
+        if ui.add(slider).drag_stopped() {
+            asks.push(PanelAsk::Rebuild);
+        }
+    }
 }
 
 fn solver_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAsk>) {

@@ -7,7 +7,7 @@ use crate::gpu::{
     Gpu, PassTime, Timer, read_buffer, read_texture_depth, read_texture_rgba8, read_texture_rgba16f,
 };
 use crate::passes::frame::FramePasses;
-use crate::passes::light_path::RefitCounts;
+use crate::passes::light_path::{Primitives, RefitCounts};
 use crate::passes::tools::DrawnTool;
 use crate::passes::view::View;
 use crate::scene::Scene;
@@ -188,7 +188,7 @@ impl Renderer {
         )?)
     }
 
-    /// Normals a point, tangents a vertex, planes a point (none for the tangent plane).
+    /// Normals a point, tangents a vertex, primitives a point (none for the tangent plane).
     ///
     /// # Errors
     ///
@@ -198,7 +198,11 @@ impl Renderer {
         Ok(DrawnGeometry {
             normals: read(&self.passes.tangents.normals)?,
             tangents: read(&self.passes.tangents.tangents)?,
-            planes: self.passes.light_path.planes().map(read).transpose()?,
+            primitives: match self.passes.light_path.primitives() {
+                Primitives::Tangent | Primitives::DepthMaps => None,
+                Primitives::Planes(buffer) => Some((4, read(buffer)?)),
+                Primitives::Quadrics(buffer) => Some((8, read(buffer)?)),
+            },
         })
     }
 }
@@ -209,6 +213,6 @@ pub struct DrawnGeometry {
     pub normals: Vec<[f32; 4]>,
     /// Unit tangent of each vertex, handedness in the last.
     pub tangents: Vec<[f32; 4]>,
-    /// Unit normal and signed offset [m] of each point's plane.
-    pub planes: Option<Vec<[f32; 4]>>,
+    /// Numbers of each point's primitive, and one vector after another of them.
+    pub primitives: Option<(usize, Vec<[f32; 4]>)>,
 }

@@ -7,6 +7,7 @@
 //! planes) and eq. 14, whose unsigned offset loses the side; ours keeps it.
 
 use super::patch::Patches;
+use super::sample::{Sample, Samples};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -25,16 +26,25 @@ pub enum LightPathMethod {
     Full,
     /// Planes fitted anew where something moved.
     Incremental,
+    /// Planes fitted to sixteen weighted samples of each patch, where something moved.
+    Sampled,
+    /// Paraboloids through each point, fitted to the same samples, where something moved.
+    Quadric,
+    /// Nothing is fitted: where light enters is read from a depth map of each light.
+    DepthMap,
 }
 
 impl LightPathMethod {
     /// Every method, cheapest first.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 8] = [
         Self::Tangent,
         Self::Stale,
         Self::Carried,
+        Self::Sampled,
+        Self::Quadric,
         Self::Incremental,
         Self::Full,
+        Self::DepthMap,
     ];
 
     /// As scene files and charts call it.
@@ -45,6 +55,9 @@ impl LightPathMethod {
             Self::Carried => "carried",
             Self::Full => "full",
             Self::Incremental => "incremental",
+            Self::Sampled => "sampled",
+            Self::Quadric => "quadric",
+            Self::DepthMap => "depth-map",
         }
     }
 }
@@ -189,6 +202,75 @@ pub fn fit_plane(members: impl Iterator<Item = Vec3>, at: Vec3, normal: Vec3) ->
     plane_of_moments(mean, spread, normal)
 }
 
+/// Least-squares plane through the weighted `samples` of a patch, seen from the point `at` [m] with unit
+/// normal `normal`.
+///
+/// The tangent plane where the samples have no thinnest direction: fewer than three, at one place, on one
+/// line; and where their mean lies within `skip_m` of it and their plane leans by no more over the radius of the
+/// patch. Twin of `shaders/plane_sampled.wgsl`.
+pub fn fit_sampled_plane(
+    samples: &[Sample],
+    points: &[Vec3],
+    [at, normal]: [Vec3; 2],
+    skip_m: f32,
+) -> Plane {
+    let mut total = 0.0;
+    let mut sum = Vec3::ZERO;
+    let mut squares = Vec3::ZERO;
+    let mut products = Vec3::ZERO;
+    for sample in samples {
+        let d = points[sample.point as usize] - at;
+        total += sample.weight;
+        sum += sample.weight * d;
+        squares += sample.weight * d * d;
+        products += sample.weight * Vec3::new(d.x * d.y, d.x * d.z, d.y * d.z);
+    }
+    let share = 1.0 / total;
+    let mean = share * sum;
+    let spread = Spread {
+        squares: share * squares - mean * mean,
+        products: share * products - Vec3::new(mean.x * mean.y, mean.x * mean.z, mean.y * mean.z),
+    };
+    if is_flat(mean, spread, normal, skip_m) {
+        return Plane::tangent(normal);
+    }
+    plane_of_moments(mean, spread, normal)
+}
+
+/// Whether the mean of a patch lies within `skip_m` of the tangent plane and its plane leans by no more over the
+/// radius of the patch, the root of twice the trace.
+fn is_flat(mean: Vec3, spread: Spread, normal: Vec3, skip_m: f32) -> bool {
+    let (s, p) = (spread.squares, spread.products);
+    let spread = glam::Mat3::from_cols_array(&[s.x, p.x, p.y, p.x, s.y, p.z, p.y, p.z, s.z]);
+    let turned = spread * normal;
+    let along = turned - normal * normal.dot(turned);
+    let trace = s.x + s.y + s.z;
+    normal.dot(mean).abs() < skip_m && 8.0 * along.dot(along) < skip_m * skip_m * trace
+}
+
+/// How deep below the tangent plane the mean of a patch may lie [m] for light of extinction `extinction_per_m` to
+/// meet no more than `optical_depth` on the way between: on a sphere of radius R that is r²/4R, and with
+/// r = −ln ε / σ the optical depth is (ln ε)² / (4 σ R).
+pub fn skip_from_optical_depth_m(optical_depth: f32, extinction_per_m: f32) -> f32 {
+    optical_depth / extinction_per_m
+}
+
+/// [`fit_sampled_plane`] for every point.
+pub fn fit_sampled_planes(
+    points: &[Vec3],
+    normals: &[Vec3],
+    samples: &Samples,
+    skip_m: f32,
+) -> Vec<Plane> {
+    let mut planes: Vec<Plane> = normals.iter().map(|&n| Plane::tangent(n)).collect();
+    for (own, &point) in samples.of_slot.iter().zip(&samples.order) {
+        let point = point as usize;
+        let here = [points[point], normals[point]];
+        planes[point] = fit_sampled_plane(own, points, here, skip_m);
+    }
+    planes
+}
+
 /// [`fit_plane`] for the patch of every point.
 pub fn fit_planes(points: &[Vec3], normals: &[Vec3], patches: &Patches) -> Vec<Plane> {
     (0..points.len())
@@ -233,15 +315,24 @@ pub fn exact_plane(
     at: DVec3,
     normal: DVec3,
 ) -> Option<(DVec3, f64)> {
-    let count = members.clone().count();
-    if count < 3 {
+    exact_weighted_plane(members.map(|member| (member, 1.0)), at, normal)
+}
+
+/// As [`exact_plane`], with a weight for each member.
+pub fn exact_weighted_plane(
+    members: impl Iterator<Item = (DVec3, f64)> + Clone,
+    at: DVec3,
+    normal: DVec3,
+) -> Option<(DVec3, f64)> {
+    if members.clone().count() < 3 {
         return None;
     }
-    let mean = members.clone().sum::<DVec3>() / count as f64;
+    let total: f64 = members.clone().map(|(_, weight)| weight).sum();
+    let mean = members.clone().map(|(m, weight)| weight * m).sum::<DVec3>() / total;
     let mut spread = nalgebra::Matrix3::<f64>::zeros();
-    for member in members {
+    for (member, weight) in members {
         let d = nalgebra::Vector3::from((member - mean).to_array());
-        spread += d * d.transpose();
+        spread += d * d.transpose() * weight;
     }
     let eigen = spread.symmetric_eigen();
     let column = eigen.eigenvectors.column(eigen.eigenvalues.imin());
@@ -285,6 +376,33 @@ mod tests {
                 "{plane:?} for {exact}"
             );
         }
+    }
+
+    #[test]
+    fn a_cap_takes_no_fit_below_the_depth_that_theory_gives_and_a_leaning_patch_always_does() {
+        let (radius_m, r_m) = (0.05, 0.01);
+        let depth_m = r_m * r_m / (4.0 * radius_m);
+        let points = cap(radius_m, r_m);
+        let samples: Vec<Sample> = (0..points.len() as u32)
+            .map(|point| Sample {
+                point,
+                weight: 1.0 / 4000.0,
+            })
+            .collect();
+        let fit = |normal: Vec3, skip_m: f32| {
+            fit_sampled_plane(&samples, &points, [Vec3::ZERO, normal], skip_m)
+        };
+        assert_eq!(fit(Vec3::Y, 1.01 * depth_m), Plane::tangent(Vec3::Y));
+        assert!((fit(Vec3::Y, 0.99 * depth_m).offset_m / depth_m + 1.0).abs() < 0.01);
+        // Leaning by 0.1 over 10 mm is 1 mm, more than is asked to be passed over.
+        let leaning = Vec3::new(0.1, 1.0, 0.0).normalize();
+        assert!(fit(leaning, 0.9e-3).normal.angle_between(Vec3::Y) < 1e-3);
+        assert_eq!(fit(leaning, 1.1e-3), Plane::tangent(leaning));
+
+        // An optical depth of 0.1 in a medium of r = -ln 0.01 / sigma.
+        let sigma = -0.01_f32.ln() / r_m;
+        let change = 0.01_f32.ln().powi(2) / (4.0 * sigma * radius_m);
+        assert!((skip_from_optical_depth_m(change, sigma) / depth_m - 1.0).abs() < 1e-5);
     }
 
     #[test]

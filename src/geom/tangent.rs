@@ -277,6 +277,42 @@ pub fn gradient_max_per_m(mesh: &SurfaceMesh, fans: &Fans, rest_normals: &[Vec3]
         .map_or(0.0, |median| GRADIENT_GROWTH_MAX * median)
 }
 
+/// Gradients of u along tangent and bitangent, then of v [1/m]: the same however the frame is turned.
+pub fn gradients_in_frame(frame: &TangentFrame, normal: Vec3) -> [f32; 4] {
+    let bitangent = frame.handedness * normal.cross(frame.tangent);
+    let [u, v] = frame.uv_gradients;
+    [
+        u.dot(frame.tangent),
+        u.dot(bitangent),
+        v.dot(frame.tangent),
+        v.dot(bitangent),
+    ]
+}
+
+/// [`gradients_in_frame`] of every vertex of `mesh` at rest.
+pub fn rest_gradients(mesh: &SurfaceMesh) -> Vec<[f32; 4]> {
+    let fans = Fans::new(mesh);
+    let normals = rest_normals(mesh, &fans);
+    tangent_frames(&fans, &mesh.point_of, &mesh.points, &normals, f32::MAX)
+        .iter()
+        .zip(&mesh.point_of)
+        .map(|(frame, &point)| gradients_in_frame(frame, normals[point as usize]))
+        .collect()
+}
+
+/// How thick a layer is now, as a share of how thick it is at rest: the area at rest over that now, from gradients
+/// as [`gradients_in_frame`] gives them. From a quarter to four; 1 where the texture map has no area.
+///
+/// Twin of `thickness_of` in `shaders/geometry.wgsl`.
+pub fn thickness_share(now: [f32; 4], rest: [f32; 4]) -> f32 {
+    let area = |[ut, ub, vt, vb]: [f32; 4]| (ut * vb - ub * vt).abs();
+    if area(rest) > 1e-12 {
+        (area(now) / area(rest)).clamp(0.25, 4.0)
+    } else {
+        1.0
+    }
+}
+
 /// Normals in f64, triangle by triangle: the oracle. `None` where a point has no area at all.
 pub fn exact_normals(mesh: &SurfaceMesh, points: &[Vec3]) -> Vec<Option<DVec3>> {
     let mut areas = vec![DVec3::ZERO; points.len()];
@@ -366,6 +402,27 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn layers_of_stretched_tissue_keep_their_volume() {
+        let mesh = wavy(9);
+        let fans = Fans::new(&mesh);
+        let rest = rest_gradients(&mesh);
+        for scale in [1.0, 1.5, 0.8] {
+            let points: Vec<Vec3> = mesh.points.iter().map(|&p| scale * p).collect();
+            let normals = rest_normals(&mesh, &fans);
+            let frames = tangent_frames(&fans, &mesh.point_of, &points, &normals, f32::MAX);
+            for (vertex, frame) in frames.iter().enumerate() {
+                let normal = normals[mesh.point_of[vertex] as usize];
+                let now = gradients_in_frame(frame, normal);
+                let volume = thickness_share(now, rest[vertex]) * scale * scale;
+                // Rounding of edges.
+                assert!((volume - 1.0).abs() < 1e-3, "{volume}");
+            }
+        }
+        assert_eq!(thickness_share([9.0; 4], [0.0; 4]), 1.0);
+        assert_eq!(thickness_share([1e9, 0.0, 0.0, 1e9], rest[0]), 4.0);
     }
 
     #[test]

@@ -91,6 +91,17 @@ pub fn read_texture_depth(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<f32>
     )?))
 }
 
+/// Words of a texture of four u32 a texel, row by row.
+///
+/// # Errors
+///
+/// [`GpuError::ReadBack`] if it can't be mapped.
+pub fn read_texture_words(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<[u32; 4]>, GpuError> {
+    Ok(bytemuck::pod_collect_to_vec(&read_texture(
+        gpu, texture, 16,
+    )?))
+}
+
 fn read_texture(
     gpu: &Gpu,
     texture: &wgpu::Texture,

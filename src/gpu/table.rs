@@ -19,6 +19,8 @@ pub enum Entry {
     Pairs,
     /// `u32`: as pairs; a kernel may write it.
     Words,
+    /// `vec4u`: as pairs.
+    Quads,
 }
 
 impl Entry {
@@ -28,12 +30,13 @@ impl Entry {
             Self::Floats => wgpu::TextureFormat::Rgba32Float,
             Self::Pairs => wgpu::TextureFormat::Rg32Uint,
             Self::Words => wgpu::TextureFormat::R32Uint,
+            Self::Quads => wgpu::TextureFormat::Rgba32Uint,
         }
     }
 
     fn bytes(self) -> usize {
         match self {
-            Self::Floats => 16,
+            Self::Floats | Self::Quads => 16,
             Self::Pairs => 8,
             Self::Words => 4,
         }

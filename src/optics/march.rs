@@ -3,22 +3,71 @@
 //! Twin of `shaders/subsurface.wgsl`, fn `single_scattering`, for one far light. Source: François 2006, Algorithms
 //! 1 and 2; Norberg 2010, eqs. 10 to 14.
 
-use super::light_plane::{PlanePair, way_to_light};
+use super::light_plane::{self, PlanePair};
+use super::light_quadric::{self, Aim, Bend};
 use super::medium::{
     UNLIT, above, gather, gather_at_start, mean_transmittance, optical_depth, phase, segment,
 };
 use super::{LAYERS, Layer};
 use glam::Vec3;
 
+/// What stands for the surface over a view ray, and how the light meets it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Cover {
+    /// Tangent plane and fitted plane.
+    Planes {
+        /// Both planes at P.
+        pair: PlanePair,
+        /// N · to_light.
+        tangent_light: f32,
+        /// n · to_light, for the fitted plane.
+        plane_light: f32,
+    },
+    /// A paraboloid.
+    Quadric {
+        /// With the eye.
+        bend: Bend,
+        /// With the light.
+        aim: Aim,
+    },
+}
+
+impl Cover {
+    /// N · to_eye.
+    pub fn cos_eye(&self) -> f32 {
+        match self {
+            Self::Planes { pair, .. } => pair.tangent_eye,
+            Self::Quadric { bend, .. } => bend.to_eye.z,
+        }
+    }
+
+    /// Length [m] of the light's way to the point `t` [m] along the view ray, and its cosine where it enters;
+    /// `None` where no light comes straight.
+    pub fn way_to_light(&self, t: f32, blend: f32) -> Option<(f32, f32)> {
+        match self {
+            Self::Planes {
+                pair,
+                tangent_light,
+                plane_light,
+            } => light_plane::way_to_light(pair, t, blend, *tangent_light, *plane_light),
+            Self::Quadric { bend, aim } => light_quadric::way_to_light(bend, aim, t),
+        }
+    }
+
+    /// Where the view ray leaves the body again [m], as far as the cover tells.
+    pub fn exit_m(&self) -> f32 {
+        match self {
+            Self::Planes { .. } => f32::INFINITY,
+            Self::Quadric { bend, .. } => bend.exit_m(),
+        }
+    }
+}
+
 /// A view ray, seen from the point P where it meets the surface, and the light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// The planes at P.
-    pub pair: PlanePair,
-    /// N · to_light.
-    pub tangent_light: f32,
-    /// n · to_light, for the fitted plane.
-    pub plane_light: f32,
+    /// What lies over it.
+    pub cover: Cover,
     /// to_light · to_eye.
     pub light_eye: f32,
     /// How far the march goes [m].
@@ -76,7 +125,8 @@ impl Tissue {
     }
 
     fn light_depth(&self, ray: &Ray, t: f32, blend: f32, bottoms: Vec3) -> Vec3 {
-        way_to_light(&ray.pair, t, blend, ray.tangent_light, ray.plane_light)
+        ray.cover
+            .way_to_light(t, blend)
             .map_or(Vec3::splat(UNLIT), |(s, cosine)| {
                 optical_depth(s, cosine, bottoms, &self.extinction)
             })
@@ -84,7 +134,7 @@ impl Tissue {
 }
 
 fn by_layer(ray: &Ray, tissue: &Tissue, bottoms: impl Fn(f32) -> Vec3, pieces: u32) -> Vec3 {
-    let cos_eye = ray.pair.tangent_eye.max(1e-3);
+    let cos_eye = ray.cover.cos_eye().max(1e-3);
     // Where a layer ends, as far as the boundaries read at one place tell; the last ends with the march.
     let end = |layer: usize, t: f32, found: Vec3| {
         if layer + 1 < LAYERS {
@@ -96,7 +146,7 @@ fn by_layer(ray: &Ray, tissue: &Tissue, bottoms: impl Fn(f32) -> Vec3, pieces: u
     let mut t = 0.0;
     let mut a = Vec3::ZERO;
     let mut found = bottoms(0.0);
-    let mut depth = tissue.light_depth(ray, 0.0, 0.0, Vec3::ZERO);
+    let mut depth = tissue.light_depth(ray, 0.0, 0.0, bottoms(0.0));
     let mut sum = Vec3::ZERO;
     for layer in 0..LAYERS {
         for left in (1..=pieces).rev() {
@@ -121,12 +171,12 @@ fn by_step(
     samples: u32,
     rule: Rule,
 ) -> Vec3 {
-    let cos_eye = ray.pair.tangent_eye.max(1e-3);
+    let cos_eye = ray.cover.cos_eye().max(1e-3);
     let is_published = rule == Rule::Published;
     let mut t = 0.0;
     let mut a = Vec3::ZERO;
     let mut below = -bottoms(0.0);
-    let mut depth = tissue.light_depth(ray, 0.0, 0.0, Vec3::ZERO);
+    let mut depth = tissue.light_depth(ray, 0.0, 0.0, bottoms(0.0));
     let mut sum = Vec3::ZERO;
     for i in 1..=samples {
         let even = i as f32 / samples as f32;
@@ -181,9 +231,11 @@ mod tests {
     fn flat(cos_light: f32, cos_eye: f32, reach_m: f32) -> Ray {
         let sine = |c: f32| (1.0 - c * c).sqrt();
         Ray {
-            pair: PlanePair::tangent(cos_eye),
-            tangent_light: cos_light,
-            plane_light: cos_light,
+            cover: Cover::Planes {
+                pair: PlanePair::tangent(cos_eye),
+                tangent_light: cos_light,
+                plane_light: cos_light,
+            },
             light_eye: cos_light * cos_eye - sine(cos_light) * sine(cos_eye),
             reach_m,
         }
@@ -285,14 +337,16 @@ mod tests {
         let layers = table_1();
         let bottoms = |t: f32| Vec3::new(0.0003 + 0.1 * t, 0.0008 + 0.1 * t, 0.003);
         let ray = Ray {
-            pair: PlanePair {
-                normals: 0.97,
-                tangent_eye: 0.7,
-                plane_eye: 0.8,
-                offset_m: -0.0003,
+            cover: Cover::Planes {
+                pair: PlanePair {
+                    normals: 0.97,
+                    tangent_eye: 0.7,
+                    plane_eye: 0.8,
+                    offset_m: -0.0003,
+                },
+                tangent_light: 0.6,
+                plane_light: 0.4,
             },
-            tangent_light: 0.6,
-            plane_light: 0.4,
             light_eye: 0.2,
             reach_m: 0.006,
         };
@@ -313,8 +367,11 @@ mod tests {
         let layers = [table_1()[0]; LAYERS];
         let ray = flat(0.3, 0.9, 12.0 / 1600.0);
         let blind = Ray {
-            tangent_light: 1e6,
-            plane_light: 1e6,
+            cover: Cover::Planes {
+                pair: PlanePair::tangent(0.9),
+                tangent_light: 1e6,
+                plane_light: 1e6,
+            },
             ..ray
         };
         let got = march(&blind, &layers, |_| Vec3::ONE, 1, Rule::ClosedForm);

@@ -1,14 +1,17 @@
 //! The passes of a scene, and one frame of them in order.
 
+use super::depth_maps::DepthMaps;
 use super::draw::Target;
 use super::geometry::{Geometry, GeometryTargets};
-use super::light_path::{LightPath, RefitCounts};
+use super::light_path::{LightPath, LightPathKnobs, RefitCounts};
 use super::lightmap::{LightMap, uv_per_m};
 use super::maps::Maps;
 use super::mesh_buffers::MeshBuffers;
 use super::plane_carried::PlaneCarried;
 use super::plane_full::PlaneFull;
 use super::plane_incremental::PlaneIncremental;
+use super::plane_sampled::PlaneSampled;
+use super::quadric::Quadrics;
 use super::shadow::Shadow;
 use super::surface::{Surface, SurfaceInputs};
 use super::tangents::Tangents;
@@ -19,7 +22,7 @@ use super::{DEPTH_FORMAT, PICTURE_FORMAT, RADIANCE_FORMAT};
 use crate::geom::SurfaceMesh;
 use crate::geom::paint::TissueMaps;
 use crate::geom::patch::radius_from_extinction_m;
-use crate::geom::plane::LightPathMethod;
+use crate::geom::plane::{LightPathMethod, skip_from_optical_depth_m};
 use crate::gpu::{Gpu, GpuError, Timer, uniform};
 use crate::scene::{PlacedLight, RestBox, Scene, SurfaceKind, SurfaceSection};
 use glam::{Mat4, Vec3};
@@ -42,6 +45,7 @@ impl FramePlan {
         let kind = scene.surface.kind;
         let method = effective_method(scene);
         let shadow = scene.lights.iter().any(|light| light.shadow);
+        let by_depth = method == Some(LightPathMethod::DepthMap);
         let gooey = kind == SurfaceKind::Gooey;
         let blurs = scene.surface.blur_passes;
         let all = [
@@ -57,7 +61,14 @@ impl FramePlan {
                 2,
                 method == Some(LightPathMethod::Incremental),
             ),
-            (Shadow::NAME, 1, shadow),
+            (
+                PlaneSampled::NAME,
+                2,
+                method == Some(LightPathMethod::Sampled),
+            ),
+            (Quadrics::NAME, 2, method == Some(LightPathMethod::Quadric)),
+            (DepthMaps::NAME, scene.lights.len() as u32, by_depth),
+            (Shadow::NAME, 1, shadow && !by_depth),
             (LightMap::NAME, 1, gooey),
             (LightMap::BLUR_NAME, blurs, gooey && blurs > 0),
             (Geometry::NAME, 1, true),
@@ -119,6 +130,7 @@ pub struct FramePasses {
     /// What is shown.
     pub picture: Target,
     shadow: Option<Shadow>,
+    depth_maps: Option<DepthMaps>,
     light_map: Option<LightMap>,
     geometry: Geometry,
     surface: Surface,
@@ -133,6 +145,19 @@ pub struct FramePasses {
     uv_per_m: f32,
     map_size_px: u32,
     size: [u32; 2],
+}
+
+/// The map that says where light 0 enters the body.
+fn shadow_map<'a>(
+    shadow: Option<&'a Shadow>,
+    depth_maps: Option<&'a DepthMaps>,
+    none: &'a Target,
+) -> &'a Target {
+    let of_all = depth_maps.map(|maps| &maps.depth);
+    shadow
+        .map(|shadow| &shadow.target)
+        .or(of_all)
+        .unwrap_or(none)
 }
 
 /// Radius of the patches of a scene [m]: told, or from the densest layer's extinction.
@@ -152,6 +177,19 @@ pub fn tolerance_m(scene: &Scene) -> f32 {
     told.unwrap_or_else(|| patch_radius_m(scene) / 4000.0)
 }
 
+/// What the light path of a scene is built from.
+pub fn light_path_knobs(scene: &Scene) -> LightPathKnobs {
+    LightPathKnobs {
+        method: effective_method(scene).unwrap_or(LightPathMethod::Tangent),
+        radius_m: patch_radius_m(scene),
+        tolerance_m: tolerance_m(scene),
+        skip_m: skip_from_optical_depth_m(
+            scene.light_path.skip_optical_depth,
+            scene.surface.bounding_extinction_per_m(),
+        ),
+    }
+}
+
 impl FramePasses {
     /// Builds what `scene` needs and nothing else, for pictures of `size` [px].
     ///
@@ -168,18 +206,16 @@ impl FramePasses {
     ) -> Result<Self, GpuError> {
         let mesh = MeshBuffers::new(gpu, surface_mesh)?;
         let tangents = Tangents::new(gpu, surface_mesh, &mesh)?;
-        let radius_m = patch_radius_m(scene);
-        let light_path = LightPath::new(
-            gpu,
-            effective_method(scene).unwrap_or(LightPathMethod::Tangent),
-            radius_m,
-            tolerance_m(scene),
-            surface_mesh,
-            &mesh,
-            &tangents,
-        )?;
+        let light_path =
+            LightPath::new(gpu, light_path_knobs(scene), surface_mesh, &mesh, &tangents)?;
         let lights = placed_lights(scene, rest);
-        let shadow = if lights.iter().any(|light| light.shadow) {
+        // Depth maps hold the shadow map too.
+        let depth_maps = if matches!(light_path, LightPath::DepthMap) {
+            Some(DepthMaps::new(gpu, surface_mesh, lights.len(), &tangents)?)
+        } else {
+            None
+        };
+        let shadow = if depth_maps.is_none() && lights.iter().any(|light| light.shadow) {
             Some(Shadow::new(gpu, surface_mesh)?)
         } else {
             None
@@ -199,7 +235,7 @@ impl FramePasses {
         let constants = light_constants(&lights);
         let maps = Maps::new(gpu, tissue);
         let no_shadow = Target::new(gpu, "no shadow", [1; 2], DEPTH_FORMAT);
-        let shadow_map = shadow.as_ref().map_or(&no_shadow, |shadow| &shadow.target);
+        let shadow_map = shadow_map(shadow.as_ref(), depth_maps.as_ref(), &no_shadow);
         let light_map = if scene.surface.kind == SurfaceKind::Gooey {
             Some(LightMap::new(
                 gpu,
@@ -216,11 +252,12 @@ impl FramePasses {
         };
         let geometry = Geometry::new(
             gpu,
-            scene.surface.kind,
+            &scene.surface,
             &frame,
+            surface_mesh,
             &mesh,
             &tangents,
-            light_path.planes(),
+            light_path.primitives(),
         )?;
         let targets = GeometryTargets::new(gpu, scene.surface.kind, size);
         let surface = Surface::new(
@@ -229,10 +266,12 @@ impl FramePasses {
             &SurfaceInputs {
                 frame: &frame,
                 light_constants: &constants,
+                cover: light_path.primitives().cover(),
                 geometry: &targets,
                 maps: &maps,
                 light_map: light_map.as_ref().map_or(&maps.outer, LightMap::view),
                 shadow_map: &shadow_map.view,
+                depth_maps: depth_maps.as_ref(),
             },
         )?;
         let radiance = Target::new(gpu, "radiance", size, RADIANCE_FORMAT);
@@ -246,6 +285,7 @@ impl FramePasses {
             radiance,
             targets,
             shadow,
+            depth_maps,
             light_map,
             geometry,
             surface,
@@ -274,12 +314,14 @@ impl FramePasses {
         self.radiance = Target::new(gpu, "radiance", size, RADIANCE_FORMAT);
         self.picture = Target::new(gpu, "picture", size, PICTURE_FORMAT);
         self.targets = GeometryTargets::new(gpu, self.knobs.kind, size);
-        let shadow_map = self.shadow.as_ref().map_or(&self.no_shadow, |s| &s.target);
+        let depth_maps = self.depth_maps.as_ref();
+        let shadow_map = shadow_map(self.shadow.as_ref(), depth_maps, &self.no_shadow);
         self.surface.rebind(
             gpu,
             &SurfaceInputs {
                 frame: &self.frame,
                 light_constants: &light_constants(&self.lights),
+                cover: self.light_path.primitives().cover(),
                 geometry: &self.targets,
                 maps: &self.maps,
                 light_map: self
@@ -287,6 +329,7 @@ impl FramePasses {
                     .as_ref()
                     .map_or(&self.maps.outer, LightMap::view),
                 shadow_map: &shadow_map.view,
+                depth_maps,
             },
         );
         self.tone_map = ToneMap::new(gpu, &self.radiance, &self.targets.depth)?;
@@ -309,8 +352,8 @@ impl FramePasses {
         encoder: &mut wgpu::CommandEncoder,
         timer: &mut Timer,
     ) {
-        let shadow_from_world = match (&self.shadow, self.lights.first()) {
-            (Some(_), Some(light)) => shadow_from_world(light.place, points),
+        let shadow_from_world = match self.lights.first() {
+            Some(light) if light.shadow => shadow_from_world(light.place, points),
             _ => Mat4::IDENTITY,
         };
         let frame = FrameUniform::new(
@@ -332,6 +375,10 @@ impl FramePasses {
         // Where the first light is cut off.
         if let Some(shadow) = &self.shadow {
             shadow.record(gpu, shadow_from_world, &self.mesh, encoder, timer);
+        }
+        // Where each light enters.
+        if let Some(maps) = &self.depth_maps {
+            maps.record(gpu, &self.lights, points, &self.mesh, encoder, timer);
         }
         // Irradiance in texture space, blurred; only the gooey surface reads it.
         if let Some(light_map) = &self.light_map {
@@ -425,6 +472,24 @@ mod tests {
                 "tangents", "lightmap", "blur", "geometry", "gooey", "tonemap"
             ]
         );
+        let by_depth = |shadow: &str| {
+            plan(&format!(
+                "shadow = {shadow}\n[light_path]\nmethod = \"depth-map\"\n[surface]\nkind = \"subsurface\""
+            ))
+        };
+        for shadow in ["false", "true"] {
+            assert_eq!(
+                names(&by_depth(shadow)),
+                [
+                    "tangents",
+                    "depth-maps",
+                    "geometry",
+                    "subsurface",
+                    "tonemap"
+                ],
+                "one map serves both"
+            );
+        }
         assert_eq!(gooey.count_of("blur"), 3);
         assert_eq!(gooey.count_of("planes-full"), 0);
     }

@@ -5,10 +5,13 @@
 //! the model reads what it left, once a pixel.
 
 use super::draw::{DepthUse, Draw, DrawKind, Target, cleared_depth, kept};
+use super::light_path::Primitives;
 use super::mesh_buffers::MeshBuffers;
 use super::tangents::Tangents;
-use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join};
-use crate::scene::SurfaceKind;
+use crate::geom::SurfaceMesh;
+use crate::geom::tangent::rest_gradients;
+use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, storage};
+use crate::scene::{SurfaceKind, SurfaceSection, UvMetric};
 
 /// Four words a pixel.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
@@ -17,7 +20,7 @@ const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 pub struct GeometryTargets {
     /// Texture coordinate, normal, tangent.
     pub base: Target,
-    /// Light-path plane, gradients of the texture coordinate; a texel where the model needs neither.
+    /// Light-path primitive, gradients of the texture coordinate; a texel where the model needs neither.
     pub detail: Target,
     /// Depth, 0 near to 1 far.
     pub depth: Target,
@@ -72,25 +75,43 @@ impl Geometry {
     /// The WGSL files of this pass, joined in this order.
     pub const WGSL: &'static [Wgsl] = crate::wgsl!["frame.wgsl", "pack.wgsl", "geometry.wgsl"];
 
-    /// Builds the pass for a model of `kind`; without `planes` the tangent plane is written for them.
+    /// Builds the pass for the model of `section`; without primitives the tangent plane is written for them.
     ///
     /// # Errors
     ///
     /// [`GpuError::Shader`] if the WGSL does not compile on this adapter.
+    #[allow(clippy::too_many_arguments, reason = "each is another pass's result")]
     pub fn new(
         gpu: &Gpu,
-        kind: SurfaceKind,
+        section: &SurfaceSection,
         frame: &wgpu::Buffer,
+        surface_mesh: &SurfaceMesh,
         mesh: &MeshBuffers,
         tangents: &Tangents,
-        planes: Option<&wgpu::Buffer>,
+        primitives: Primitives<'_>,
     ) -> Result<Self, GpuError> {
         // Only what lies below the surface is looked for with planes and gradients.
-        let has_detail = kind != SurfaceKind::Plain;
+        let has_detail = section.kind != SurfaceKind::Plain;
+        let unit_frames = section.uv_metric == UvMetric::Unit;
+        let rest_gradients = if unit_frames || section.thickness_follows_volume {
+            Some(storage(
+                gpu,
+                "gradients at rest",
+                &rest_gradients(surface_mesh),
+            )?)
+        } else {
+            None
+        };
+        let flag = |on: bool| f64::from(u8::from(on));
         let fragment: (&str, &[wgpu::TextureFormat]) = if has_detail {
             ("detail_fragment", &[FORMAT; 2])
         } else {
             ("base_fragment", &[FORMAT])
+        };
+        let primitive = match primitives {
+            Primitives::Tangent | Primitives::DepthMaps => 0.0,
+            Primitives::Planes(_) => 1.0,
+            Primitives::Quadrics(_) => 2.0,
         };
         let draw = Draw::new(
             gpu,
@@ -104,14 +125,19 @@ impl Geometry {
                 blend: None,
                 depth: DepthUse::Nearest,
                 cull: Some(wgpu::Face::Back),
-                constants: &[("HAS_PLANES", f64::from(u8::from(planes.is_some())))],
+                constants: &[
+                    ("PRIMITIVE", primitive),
+                    ("UNIT_FRAMES", flag(unit_frames)),
+                    ("FOLLOWS_VOLUME", flag(section.thickness_follows_volume)),
+                ],
             },
             &[
                 Binding::Uniform(frame),
                 Binding::Read(&mesh.positions),
                 Binding::Read(&tangents.normals),
-                // Bound but never read where there are no planes.
-                Binding::Read(planes.unwrap_or(&tangents.normals)),
+                // Bound but never read where there are none.
+                Binding::Read(primitives.buffer().unwrap_or(&tangents.normals)),
+                Binding::Read(rest_gradients.as_ref().unwrap_or(&tangents.normals)),
             ],
         )?;
         Ok(Self { draw, has_detail })

@@ -1,13 +1,17 @@
 //! The light-path primitive of the scene: one of a closed set of methods.
 
 use super::mesh_buffers::MeshBuffers;
+use super::moved_leaves::SampledPatches;
 use super::plane_carried::PlaneCarried;
 use super::plane_full::PlaneFull;
 use super::plane_incremental::PlaneIncremental;
+use super::plane_sampled::PlaneSampled;
+use super::quadric::Quadrics;
 use super::tangents::Tangents;
 use crate::geom::SurfaceMesh;
 use crate::geom::patch::Patches;
 use crate::geom::plane::{LightPathMethod, Plane, fit_planes};
+use crate::geom::sample::Samples;
 use crate::geom::tangent::{Fans, rest_normals};
 use crate::gpu::{Gpu, GpuError, Timer, storage};
 
@@ -24,6 +28,8 @@ pub struct RefitCounts {
 pub enum LightPath {
     /// Nothing: the surface shader takes the tangent plane.
     Tangent,
+    /// Nothing here: the depth maps of the lights are drawn with the shadows ([`super::depth_maps`]).
+    DepthMap,
     /// The planes at rest, uploaded once.
     Stale(wgpu::Buffer),
     /// The planes at rest, turned.
@@ -32,13 +38,71 @@ pub enum LightPath {
     Full(PlaneFull),
     /// The planes near moved points anew.
     Incremental(PlaneIncremental),
+    /// The same from sixteen samples each.
+    Sampled(PlaneSampled),
+    /// Paraboloids from the same samples.
+    Quadric(Quadrics),
+}
+
+/// What a scene says of its light path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightPathKnobs {
+    /// How the primitives follow the surface.
+    pub method: LightPathMethod,
+    /// Reach of a patch at rest [m].
+    pub radius_m: f32,
+    /// How far a point may lie from where its patches last saw it [m]; only methods that pass over what is still ask.
+    pub tolerance_m: f32,
+    /// `sampled`: a patch whose mean lies nearer to the tangent plane than this takes that plane, without a fit
+    /// [m]; 0 fits all.
+    pub skip_m: f32,
+}
+
+/// What the shaders read of a light path.
+#[derive(Clone, Copy, Debug)]
+pub enum Primitives<'a> {
+    /// Nothing: the tangent plane is meant.
+    Tangent,
+    /// Nothing a point: the depth maps of the lights.
+    DepthMaps,
+    /// Unit normal and signed offset [m] of each point's plane, `[vec4f; points]`.
+    Planes(&'a wgpu::Buffer),
+    /// The matrix of each point's paraboloid [1/m], `[[vec4f; 2]; points]`.
+    Quadrics(&'a wgpu::Buffer),
+}
+
+/// The shader text that finds a light's way by the primitives of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CoverKind {
+    /// `light_plane.wgsl`: the tangent plane, and one that was fitted.
+    Planes,
+    /// `light_quadric.wgsl`.
+    Quadrics,
+    /// `light_depth.wgsl`.
+    DepthMaps,
+}
+
+impl<'a> Primitives<'a> {
+    /// How the surface shader reads them.
+    pub fn cover(self) -> CoverKind {
+        match self {
+            Self::Tangent | Self::Planes(_) => CoverKind::Planes,
+            Self::Quadrics(_) => CoverKind::Quadrics,
+            Self::DepthMaps => CoverKind::DepthMaps,
+        }
+    }
+
+    /// The buffer, if there is one.
+    pub fn buffer(self) -> Option<&'a wgpu::Buffer> {
+        match self {
+            Self::Tangent | Self::DepthMaps => None,
+            Self::Planes(buffer) | Self::Quadrics(buffer) => Some(buffer),
+        }
+    }
 }
 
 impl LightPath {
-    /// Builds what `method` needs and nothing else.
-    ///
-    /// `radius_m` is the reach of a patch at rest; a point counts as moved when it lies farther than
-    /// `tolerance_m` from where its patches last saw it (only `incremental` asks).
+    /// Builds what the method needs and nothing else.
     ///
     /// # Errors
     ///
@@ -46,20 +110,27 @@ impl LightPath {
     /// and those of the kernels.
     pub fn new(
         gpu: &Gpu,
-        method: LightPathMethod,
-        radius_m: f32,
-        tolerance_m: f32,
+        knobs: LightPathKnobs,
         mesh: &SurfaceMesh,
         buffers: &MeshBuffers,
         tangents: &Tangents,
     ) -> Result<Self, GpuError> {
-        if method == LightPathMethod::Tangent {
-            return Ok(Self::Tangent);
+        let LightPathKnobs {
+            method,
+            radius_m,
+            tolerance_m,
+            skip_m,
+        } = knobs;
+        match method {
+            LightPathMethod::Tangent => return Ok(Self::Tangent),
+            LightPathMethod::DepthMap => return Ok(Self::DepthMap),
+            _ => {}
         }
         let normals = rest_normals(mesh, &Fans::new(mesh));
         let patches = Patches::new(&mesh.points, &normals, radius_m);
         Ok(match method {
             LightPathMethod::Tangent => Self::Tangent,
+            LightPathMethod::DepthMap => Self::DepthMap,
             LightPathMethod::Stale => {
                 let planes: Vec<[f32; 4]> = fit_planes(&mesh.points, &normals, &patches)
                     .into_iter()
@@ -81,55 +152,97 @@ impl LightPath {
                 buffers,
                 tangents,
             )?),
+            LightPathMethod::Sampled | LightPathMethod::Quadric => {
+                let samples = Samples::new(&mesh.points, &patches);
+                let dependents = samples.dependents(&mesh.point_triangles());
+                let sampled = |samples| SampledPatches {
+                    samples,
+                    dependents: &dependents,
+                    radius_m,
+                    tolerance_m,
+                    skip_m,
+                };
+                let points = &mesh.points;
+                if method == LightPathMethod::Sampled {
+                    let patches = sampled(&samples);
+                    Self::Sampled(PlaneSampled::new(
+                        gpu, points, &normals, &patches, buffers, tangents,
+                    )?)
+                } else {
+                    let samples = samples.weighted_to_the_middle(points);
+                    let patches = sampled(&samples);
+                    Self::Quadric(Quadrics::new(
+                        gpu, points, &normals, &patches, buffers, tangents,
+                    )?)
+                }
+            }
         })
     }
 
     /// Adds this frame's passes to `encoder`, after the tangents.
     pub fn record(&self, encoder: &mut wgpu::CommandEncoder, timer: &mut Timer) {
         match self {
-            Self::Tangent | Self::Stale(_) => {}
+            Self::Tangent | Self::DepthMap | Self::Stale(_) => {}
             Self::Carried(pass) => pass.record(encoder, timer),
             Self::Full(pass) => pass.record(encoder, timer),
             Self::Incremental(pass) => pass.record(encoder, timer),
+            Self::Sampled(pass) => pass.record(encoder, timer),
+            Self::Quadric(pass) => pass.record(encoder, timer),
         }
     }
 
-    /// Unit normal and signed offset [m] of each point's plane, `[vec4f; points]`; `None` where the
-    /// tangent plane is meant.
-    pub fn planes(&self) -> Option<&wgpu::Buffer> {
+    /// What the shaders read.
+    pub fn primitives(&self) -> Primitives<'_> {
         match self {
-            Self::Tangent => None,
-            Self::Stale(planes) => Some(planes),
-            Self::Carried(pass) => Some(&pass.planes),
-            Self::Full(pass) => Some(&pass.planes),
-            Self::Incremental(pass) => Some(&pass.planes),
+            Self::Tangent => Primitives::Tangent,
+            Self::DepthMap => Primitives::DepthMaps,
+            Self::Stale(planes) => Primitives::Planes(planes),
+            Self::Carried(pass) => Primitives::Planes(&pass.planes),
+            Self::Full(pass) => Primitives::Planes(&pass.planes),
+            Self::Incremental(pass) => Primitives::Planes(&pass.planes),
+            Self::Sampled(pass) => Primitives::Planes(&pass.planes),
+            Self::Quadric(pass) => Primitives::Quadrics(&pass.quadrics),
+        }
+    }
+
+    /// Unit normal and signed offset [m] of each point's plane, `[vec4f; points]`; `None` where there are none.
+    pub fn planes(&self) -> Option<&wgpu::Buffer> {
+        match self.primitives() {
+            Primitives::Planes(planes) => Some(planes),
+            Primitives::Tangent | Primitives::DepthMaps | Primitives::Quadrics(_) => None,
         }
     }
 
     /// Names of the passes it records, as the timer knows them.
     pub fn pass_names(&self) -> &'static [&'static str] {
         match self {
-            Self::Tangent | Self::Stale(_) => &[],
+            Self::Tangent | Self::DepthMap | Self::Stale(_) => &[],
             Self::Carried(_) => &[PlaneCarried::NAME],
             Self::Full(_) => &[PlaneFull::NAME],
             Self::Incremental(_) => &[PlaneIncremental::NAME],
+            Self::Sampled(_) => &[PlaneSampled::NAME],
+            Self::Quadric(_) => &[Quadrics::NAME],
         }
     }
 
-    /// What the last submitted frame fitted, waited for. Only `incremental` has to ask the GPU;
-    /// `full` fits all points and looks at none.
+    /// What the last submitted frame fitted, waited for. Only methods that pass over what is still have to ask
+    /// the GPU; `full` fits all points and looks at none.
     ///
     /// # Errors
     ///
     /// [`GpuError::ReadBack`] if the counts can't be read.
     pub fn counts(&self, gpu: &Gpu) -> Result<RefitCounts, GpuError> {
         match self {
-            Self::Tangent | Self::Stale(_) | Self::Carried(_) => Ok(RefitCounts::default()),
+            Self::Tangent | Self::DepthMap | Self::Stale(_) | Self::Carried(_) => {
+                Ok(RefitCounts::default())
+            }
             Self::Full(pass) => Ok(RefitCounts {
                 refitted: pass.point_count,
                 moved: pass.point_count,
             }),
             Self::Incremental(pass) => pass.counts(gpu),
+            Self::Sampled(pass) => pass.leaves.counts(gpu),
+            Self::Quadric(pass) => pass.leaves.counts(gpu),
         }
     }
 }

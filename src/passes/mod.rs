@@ -1,6 +1,7 @@
 //! One GPU pass a file. A pass owns the buffers it writes and is immutable once made.
 
 pub mod backdrop;
+pub mod depth_maps;
 pub mod draw;
 pub mod frame;
 pub mod geometry;
@@ -8,9 +9,12 @@ pub mod light_path;
 pub mod lightmap;
 pub mod maps;
 pub mod mesh_buffers;
+pub mod moved_leaves;
 pub mod plane_carried;
 pub mod plane_full;
 pub mod plane_incremental;
+pub mod plane_sampled;
+pub mod quadric;
 pub mod shadow;
 pub mod surface;
 pub mod tangents;

@@ -1,7 +1,9 @@
 //! The surface of the scene: one draw a frame over the covered pixels, by the one model the scene has.
 
+use super::depth_maps::DepthMaps;
 use super::draw::{DepthUse, Draw, DrawKind, Target, cleared, read_depth};
 use super::geometry::GeometryTargets;
+use super::light_path::CoverKind;
 use super::maps::Maps;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join};
 use crate::optics::LAYERS;
@@ -13,6 +15,8 @@ pub struct SurfaceInputs<'a> {
     pub frame: &'a wgpu::Buffer,
     /// Values of the `override`s that say which lights there are.
     pub light_constants: &'a [(&'static str, f64)],
+    /// What the light's way is found by.
+    pub cover: CoverKind,
     /// What lies at each pixel.
     pub geometry: &'a GeometryTargets,
     /// The texture maps.
@@ -21,6 +25,8 @@ pub struct SurfaceInputs<'a> {
     pub light_map: &'a wgpu::TextureView,
     /// Where light 0 enters the body; any depth texture will do without shadows.
     pub shadow_map: &'a wgpu::TextureView,
+    /// The maps of all lights, for [`CoverKind::DepthMaps`]; `shadow_map` is their depth.
+    pub depth_maps: Option<&'a DepthMaps>,
 }
 
 /// The draw of the tissue.
@@ -30,8 +36,8 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// The WGSL files of a model, joined in this order.
-    pub fn wgsl(kind: SurfaceKind) -> &'static [Wgsl] {
+    /// The WGSL files of a model, joined in this order; only `subsurface` asks for `cover`.
+    pub fn wgsl(kind: SurfaceKind, cover: CoverKind) -> &'static [Wgsl] {
         match kind {
             SurfaceKind::Plain => crate::wgsl![
                 "frame.wgsl",
@@ -41,16 +47,39 @@ impl Surface {
                 "pixel.wgsl",
                 "plain.wgsl"
             ],
-            SurfaceKind::Subsurface => crate::wgsl![
-                "frame.wgsl",
-                "pack.wgsl",
-                "film.wgsl",
-                "light.wgsl",
-                "pixel.wgsl",
-                "medium.wgsl",
-                "light_plane.wgsl",
-                "subsurface.wgsl"
-            ],
+            SurfaceKind::Subsurface => match cover {
+                CoverKind::Planes => crate::wgsl![
+                    "frame.wgsl",
+                    "pack.wgsl",
+                    "film.wgsl",
+                    "light.wgsl",
+                    "pixel.wgsl",
+                    "medium.wgsl",
+                    "light_plane.wgsl",
+                    "subsurface.wgsl"
+                ],
+                CoverKind::DepthMaps => crate::wgsl![
+                    "frame.wgsl",
+                    "pack.wgsl",
+                    "film.wgsl",
+                    "light.wgsl",
+                    "pixel.wgsl",
+                    "medium.wgsl",
+                    "light_entry.wgsl",
+                    "light_depth.wgsl",
+                    "subsurface.wgsl"
+                ],
+                CoverKind::Quadrics => crate::wgsl![
+                    "frame.wgsl",
+                    "pack.wgsl",
+                    "film.wgsl",
+                    "light.wgsl",
+                    "pixel.wgsl",
+                    "medium.wgsl",
+                    "light_quadric.wgsl",
+                    "subsurface.wgsl"
+                ],
+            },
             SurfaceKind::Gooey => crate::wgsl![
                 "frame.wgsl",
                 "pack.wgsl",
@@ -73,7 +102,12 @@ impl Surface {
         section: &SurfaceSection,
         inputs: &SurfaceInputs<'_>,
     ) -> Result<Self, GpuError> {
-        Self::with_source(gpu, section, inputs, &join(Self::wgsl(section.kind)))
+        Self::with_source(
+            gpu,
+            section,
+            inputs,
+            &join(Self::wgsl(section.kind, inputs.cover)),
+        )
     }
 
     /// As [`Surface::new`] with other WGSL: lets a test sabotage the model and see the check fail.
@@ -104,7 +138,7 @@ impl Surface {
             gpu,
             &DrawKind {
                 pass: section.kind.name(),
-                parts: Self::wgsl(section.kind),
+                parts: Self::wgsl(section.kind, inputs.cover),
                 source,
                 vertex: "pixel_vertex",
                 attributes: &[],
@@ -152,9 +186,9 @@ impl Surface {
     }
 }
 
-/// The bindings of `shaders/pixel.wgsl`, in its order.
-fn bindings<'a>(inputs: &SurfaceInputs<'a>) -> [Binding<'a>; 11] {
-    [
+/// The bindings of `shaders/pixel.wgsl`, in its order, and of `shaders/light_depth.wgsl`.
+fn bindings<'a>(inputs: &SurfaceInputs<'a>) -> Vec<Binding<'a>> {
+    let mut bindings = vec![
         Binding::Uniform(inputs.frame),
         Binding::Integers(&inputs.geometry.base.view),
         Binding::Integers(&inputs.geometry.detail.view),
@@ -166,5 +200,12 @@ fn bindings<'a>(inputs: &SurfaceInputs<'a>) -> [Binding<'a>; 11] {
         Binding::Texture(&inputs.maps.layers),
         Binding::Texture(inputs.light_map),
         Binding::Depth(inputs.shadow_map),
-    ]
+    ];
+    if let Some(maps) = inputs.depth_maps {
+        bindings.extend([
+            Binding::Uniform(&maps.views),
+            Binding::Integers(&maps.normals.view),
+        ]);
+    }
+    bindings
 }

@@ -75,6 +75,29 @@ pub fn shadow_from_world(toward: Vec3, points: &[Vec3]) -> Mat4 {
     clip_from_light * light_from_world
 }
 
+/// World to the clip space of `light`, fitted round `points` [m].
+///
+/// A near light looks at the middle of the body; what lies beyond 75 degrees from there is not in its map.
+pub fn light_from_world(light: &PlacedLight, points: &[Vec3]) -> Mat4 {
+    if !light.is_point {
+        return shadow_from_world(light.place, points);
+    }
+    let (low, high) = crate::geom::bounds(points);
+    let middle = 0.5 * (low + high);
+    let radius = 0.5 * (high - low).length() + 1e-6;
+    let distance = light.place.distance(middle);
+    let forward = (middle - light.place).normalize_or(Vec3::NEG_Z);
+    let half_angle = (1.02 * radius / distance.max(1e-6)).min(1.0).asin();
+    let clip_from_light = glam::camera::rh::proj::directx::perspective(
+        2.0 * half_angle.min(75_f32.to_radians()),
+        1.0,
+        (distance - 1.02 * radius).max(0.01 * radius),
+        distance + 1.02 * radius,
+    );
+    let up = forward.any_orthonormal_vector();
+    clip_from_light * glam::camera::rh::view::look_at_mat4(light.place, middle, up)
+}
+
 /// Mirror of `Light` in `shaders/frame.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
@@ -235,6 +258,29 @@ mod tests {
             let clip = clip_from_world.project_point3(point);
             assert!(clip.x.abs() <= 1.0 && clip.y.abs() <= 1.0, "{clip}");
             assert!((0.0..=1.0).contains(&clip.z), "{clip}");
+        }
+    }
+
+    #[test]
+    fn everything_lies_inside_the_map_of_a_near_light_outside_the_body() {
+        let points = [
+            Vec3::new(-0.1, 0.0, 0.3),
+            Vec3::new(0.2, 0.5, -0.1),
+            Vec3::new(0.0, -0.2, 0.1),
+        ];
+        for place in [Vec3::new(1.0, 0.3, 0.2), Vec3::new(0.0, 0.7, 0.1)] {
+            let light = PlacedLight {
+                place,
+                is_point: true,
+                power: Vec3::ONE,
+                shadow: false,
+            };
+            let clip_from_world = light_from_world(&light, &points);
+            for point in points {
+                let clip = clip_from_world.project_point3(point);
+                assert!(clip.x.abs() <= 1.0 && clip.y.abs() <= 1.0, "{clip}");
+                assert!((0.0..=1.0).contains(&clip.z), "{clip}");
+            }
         }
     }
 

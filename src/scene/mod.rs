@@ -75,9 +75,13 @@ pub struct LightPathSection {
     /// of the densest layer (François 2006, section 2.2), and is at least the 16 nearest points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_m: Option<f32>,
-    /// How far a point moves before `incremental` takes notice [m]. Left out, 1/4000 of the radius.
+    /// How far a point moves before `incremental`, `sampled` and `quadric` take notice [m]. Left out, 1/4000
+    /// of the radius.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance_m: Option<f32>,
+    /// `sampled`: patches whose plane changes the optical depth by less than this take no fit but the tangent
+    /// plane. 0 fits all.
+    pub skip_optical_depth: f32,
 }
 
 impl Default for LightPathSection {
@@ -86,6 +90,7 @@ impl Default for LightPathSection {
             method: LightPathMethod::Incremental,
             radius_m: None,
             tolerance_m: None,
+            skip_optical_depth: 0.0,
         }
     }
 }
@@ -186,6 +191,8 @@ impl Scene {
         if let Some(tolerance) = self.light_path.tolerance_m {
             c.range("light_path.tolerance_m", tolerance, 0.0, 1.0);
         }
+        let skip = self.light_path.skip_optical_depth;
+        c.range("light_path.skip_optical_depth", skip, 0.0, 10.0);
         for (index, marker) in self.markers.iter().enumerate() {
             let given = [
                 marker.nearest_m.is_some(),

@@ -37,6 +37,10 @@ pub struct SurfaceSection {
     pub outer_opacity: f32,
     /// `gooey`: side of the light map [px].
     pub light_map_size_px: u32,
+    /// How texture coordinates below the surface follow it as it stretches.
+    pub uv_metric: UvMetric,
+    /// Whether layers thin where the surface stretches, as tissue does that keeps its volume.
+    pub thickness_follows_volume: bool,
     /// Strength of the normal map.
     pub relief: f32,
     /// Roughness of the wet film: 0 a mirror, 1 dull.
@@ -67,6 +71,27 @@ impl SurfaceKind {
             Self::Plain => "plain",
             Self::Subsurface => "subsurface",
             Self::Gooey => "gooey",
+        }
+    }
+}
+
+/// How a step below the surface becomes one of texture coordinates.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum UvMetric {
+    /// By the metric of the deformed surface: layers keep their depth when tissue stretches.
+    #[default]
+    Deformed,
+    /// By unit tangents, as in the sources: right at rest only.
+    Unit,
+}
+
+impl UvMetric {
+    /// Name in scene files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Deformed => "deformed",
+            Self::Unit => "unit",
         }
     }
 }
@@ -134,6 +159,8 @@ impl Default for SurfaceSection {
             blur_passes: 2,
             outer_opacity: 1.0,
             light_map_size_px: 256,
+            uv_metric: UvMetric::default(),
+            thickness_follows_volume: false,
             relief: 1.0,
             roughness: 0.24,
             wetness: 1.0,
@@ -189,6 +216,12 @@ impl SurfaceSection {
             ("exposure", self.exposure, 100.0),
         ] {
             c.range(&format!("surface.{name}"), value, 0.0, high);
+        }
+        if self.thickness_follows_volume && self.uv_metric == UvMetric::Unit {
+            c.problem(
+                "surface.thickness_follows_volume",
+                "it reads the area from the deformed metric: set surface.uv_metric to \"deformed\"",
+            );
         }
         c.range("surface.roughness", self.roughness, 0.02, 1.0);
         c.range(

@@ -1,7 +1,8 @@
 //! What each light-path method costs and how wrong it is, by the share of points that move.
 //!
 //! Prints a CSV row a method, share and pattern: GPU milliseconds by timestamps, and the angle
-//! between its planes and the f64 fit of the same frame. `poke` moves the points nearest to one
+//! between its planes and the f64 fit of the same frame. Of `quadric` the angle is that of the surface's normal at the
+//! rim of the patch, against the f64 fit of the same samples. `drift` moves all alike, `poke` the points nearest to one
 //! place, `scattered` as many all over, which is the worst case for a method that skips what is
 //! still. `stale` and `tangent` have no pass; their errors say what that saves.
 
@@ -13,9 +14,11 @@ use glam::{DVec3, Vec3, Vec4};
 use palpate::geom::SurfaceMesh;
 use palpate::geom::patch::Patches;
 use palpate::geom::plane::{LightPathMethod, exact_plane};
+use palpate::geom::quadric::{Quadric, exact_quadric};
+use palpate::geom::sample::Samples;
 use palpate::geom::tangent::{Fans, rest_normals};
 use palpate::gpu::{Gpu, GpuError, Timer, read_buffer};
-use palpate::passes::light_path::{LightPath, RefitCounts};
+use palpate::passes::light_path::{LightPath, LightPathKnobs, Primitives, RefitCounts};
 use palpate::passes::mesh_buffers::MeshBuffers;
 use palpate::passes::tangents::Tangents;
 
@@ -42,10 +45,12 @@ fn main() -> Result<(), GpuError> {
         patches.lists.blocks.len() as f64 / point_count as f64,
     );
     println!(
-        "method,pattern,moved_share,moved,refitted,ms_p50,ms_p95,tangents_ms_p50,\
+        "method,skip_m,pattern,moved_share,moved,refitted,ms_p50,ms_p95,tangents_ms_p50,\
          normal_error_deg_p50,normal_error_deg_p99,oracle"
     );
-    for method in LightPathMethod::ALL {
+    // Depth maps have no pass of their own here: what they cost is the draw of `depth-maps` in a replay.
+    let fitted = |method: &LightPathMethod| *method != LightPathMethod::DepthMap;
+    for method in LightPathMethod::ALL.into_iter().filter(fitted) {
         for (pattern, share) in [
             ("none", 0.0),
             ("poke", 0.01),
@@ -56,8 +61,22 @@ fn main() -> Result<(), GpuError> {
             ("scattered", 0.2),
             ("all", 1.0),
         ] {
-            row(&gpu, &mesh, &patches, method, pattern, share)?;
+            row(&gpu, &mesh, &patches, method, 0.0, (pattern, share))?;
         }
+    }
+    // What it saves to pass over patches whose mean lies near their tangent plane, and what it costs: the waves of
+    // the sheet as they are, moved as a whole.
+    for share_of_radius in [0.0, 0.01, 0.03, 0.1] {
+        let skip_m = share_of_radius * RADIUS_M;
+        let pattern = ("drift", 1.0);
+        row(
+            &gpu,
+            &mesh,
+            &patches,
+            LightPathMethod::Sampled,
+            skip_m,
+            pattern,
+        )?;
     }
     Ok(())
 }
@@ -81,28 +100,27 @@ fn row(
     mesh: &SurfaceMesh,
     patches: &Patches,
     method: LightPathMethod,
-    pattern: &str,
-    share: f64,
+    skip_m: f32,
+    (pattern, share): (&str, f64),
 ) -> Result<(), GpuError> {
     let moving = moving_points(mesh, pattern, share);
     let buffers = MeshBuffers::new(gpu, mesh)?;
     let tangents = Tangents::new(gpu, mesh, &buffers)?;
-    let pass = LightPath::new(
-        gpu,
+    let knobs = LightPathKnobs {
         method,
-        RADIUS_M,
-        TOLERANCE_M,
-        mesh,
-        &buffers,
-        &tangents,
-    )?;
+        radius_m: RADIUS_M,
+        tolerance_m: TOLERANCE_M,
+        skip_m,
+    };
+    let pass = LightPath::new(gpu, knobs, mesh, &buffers, &tangents)?;
     let mut timer = Timer::new(gpu, 4);
     let mut points = mesh.points.clone();
     let (mut path_ms, mut tangents_ms) = (Vec::new(), Vec::new());
     let mut counts = RefitCounts::default();
     for frame in 0..WARM_UP + FRAMES {
         for &point in &moving {
-            let phase = 0.4 * frame as f32 + 200.0 * mesh.points[point].x;
+            let along = if pattern == "drift" { 0.0 } else { 200.0 };
+            let phase = 0.4 * frame as f32 + along * mesh.points[point].x;
             points[point] = mesh.points[point] - Vec3::Y * (0.006 + 0.002 * phase.sin());
         }
         buffers.upload(gpu, &points);
@@ -119,9 +137,9 @@ fn row(
             path_ms.push(times.get(1).map_or(0.0, |time| f64::from(time.gpu_ms)));
         }
     }
-    let mut errors = normal_errors_deg(gpu, patches, &points, &tangents, &pass)?;
+    let mut errors = normal_errors_deg(gpu, patches, &mesh.points, &points, &tangents, &pass)?;
     println!(
-        "{},{pattern},{share},{},{},{:.4},{:.4},{:.4},{:.5},{:.5},f64 fit of every patch",
+        "{},{skip_m},{pattern},{share},{},{},{:.4},{:.4},{:.4},{:.5},{:.5},f64 fit of every patch",
         method.name(),
         counts.moved,
         counts.refitted,
@@ -134,14 +152,50 @@ fn row(
     Ok(())
 }
 
+fn quadric_errors_deg(
+    gpu: &Gpu,
+    patches: &Patches,
+    rest: &[Vec3],
+    points: &[Vec3],
+    normals: &[Vec4],
+    buffer: &wgpu::Buffer,
+) -> Result<Vec<f64>, GpuError> {
+    let vectors: Vec<[Vec4; 2]> = read_buffer(gpu, buffer)?;
+    let samples = Samples::new(rest, patches).weighted_to_the_middle(rest);
+    let angle = |slot: usize| {
+        let own = samples.order[slot] as usize;
+        let normal = normals[own].truncate().as_dvec3();
+        let members = samples
+            .weighing(slot)
+            .filter(|s| {
+                let d = (points[s.point as usize] - points[own]).as_dvec3();
+                2.0 * d.dot(normal).powi(2) <= d.length_squared()
+            })
+            .map(|s| (points[s.point as usize].as_dvec3(), f64::from(s.weight)));
+        let exact = exact_quadric(members, points[own].as_dvec3(), normal).expect("16 samples");
+        let [squares, products] = vectors[own].map(|v| v.truncate());
+        let quadric = Quadric { squares, products };
+        let apart = [Vec3::X, Vec3::Y, Vec3::Z]
+            .map(|axis| (quadric.times(axis).as_dvec3() - exact * axis.as_dvec3()).length());
+        apart.into_iter().fold(0.0, f64::max) * f64::from(RADIUS_M)
+    };
+    Ok((0..points.len())
+        .map(|slot| angle(slot).to_degrees())
+        .collect())
+}
+
 fn normal_errors_deg(
     gpu: &Gpu,
     patches: &Patches,
+    rest: &[Vec3],
     points: &[Vec3],
     tangents: &Tangents,
     pass: &LightPath,
 ) -> Result<Vec<f64>, GpuError> {
     let normals: Vec<Vec4> = read_buffer(gpu, &tangents.normals)?;
+    if let Primitives::Quadrics(buffer) = pass.primitives() {
+        return quadric_errors_deg(gpu, patches, rest, points, &normals, buffer);
+    }
     let planes: Vec<Vec4> = match pass.planes() {
         Some(planes) => read_buffer(gpu, planes)?,
         None => normals.clone(),
