@@ -12,15 +12,15 @@ pub enum Deformation {
     Rest,
     /// Pressed in by 0.18 over a width of 0.09, with a rim; less deep where the body is thin.
     Poke,
-    /// Turned by 90 degrees about the long axis from end to end.
+    /// Turned about the long axis, from nothing at one end, which is held, to 90 degrees at the other.
     Twist,
-    /// Bent by 90 degrees along the long axis.
+    /// Bent along the long axis, from nothing at the end that is held to 90 degrees at the other.
     Bend,
     /// 1.5 times as long, as much volume.
     Stretch,
     /// Waves 0.01 high and 0.06 long along the normals.
     Ripple,
-    /// Bent by 280 degrees, or as far as the inner side lets it.
+    /// The same to 280 degrees, or as far as the inner side lets it.
     Fold,
 }
 
@@ -74,7 +74,10 @@ impl Deformation {
                 points.map(|p| poke.apply(p)).collect()
             }
             Self::Twist => points
-                .map(|p| DQuat::from_axis_angle(axes[0], 0.5 * PI * p.dot(axes[0]) / size) * p)
+                .map(|p| {
+                    let share = p.dot(axes[0]) / size + 0.5;
+                    DQuat::from_axis_angle(axes[0], 0.5 * PI * share) * p
+                })
                 .collect(),
             Self::Bend => points.map(|p| bent(p, axes, size, 0.5 * PI)).collect(),
             Self::Fold => {
@@ -102,10 +105,10 @@ impl Deformation {
     }
 }
 
-/// The middle line along the first axis becomes an arc of `angle` round the second axis.
+/// The middle line along the first axis becomes an arc of `angle` round the second axis; its lower end keeps its way.
 fn bent(p: DVec3, axes: [DVec3; 3], size: f64, angle: f64) -> DVec3 {
     let radius = size / angle;
-    let turn = p.dot(axes[0]) / radius;
+    let turn = (p.dot(axes[0]) + 0.5 * size) / radius;
     let out = radius + p.dot(axes[2]);
     axes[0] * (out * turn.sin()) + axes[1] * p.dot(axes[1]) + axes[2] * (out * turn.cos() - radius)
 }

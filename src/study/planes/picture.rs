@@ -4,7 +4,7 @@
 use super::Plan;
 use super::body::Body;
 use super::estimate::{Blend, Drawn};
-use super::sight::{SAMPLES, Sight, exact_normals};
+use super::sight::{OFF_M, SAMPLES, Sight, exact_normals};
 use super::trial::Bench;
 use crate::app::{AppError, Session, load_scene};
 use crate::geom::plane::LightPathMethod;
@@ -29,7 +29,7 @@ const METHODS: [LightPathMethod; 5] = [
 /// Width of what is seen, as a share of the organ.
 const WIDTH_SHARE: f32 = 0.62;
 /// Angle between eye and light [degrees].
-const LIGHT_DEG: f64 = 55.0;
+const LIGHT_DEG: f64 = 50.0;
 /// The error at which the scale ends, as a share of the truth.
 const ERROR_MAX: f64 = 0.5;
 /// Height of the captions [px] by the dots of a letter.
@@ -56,12 +56,7 @@ pub fn write(bench: &Bench, plan: &Plan, out: &Path) -> Result<(), AppError> {
     }
     let body = Body::as_it_lies(session.mesh.clone());
     let points = session.points().to_vec();
-    let view = View::new(
-        &body,
-        &points,
-        session.scene.camera.eye_and_target(&session.rest).0,
-        radius_m,
-    );
+    let view = View::new(&body, &points, radius_m);
     let sights = view.sights(side, bench.threads());
     let truth = all_by(bench.threads(), &sights, |sight| {
         sight.as_ref().map_or(DVec3::ZERO, |sight| {
@@ -101,8 +96,8 @@ struct View {
 }
 
 impl View {
-    /// Looks from far away, in the direction of `eye`, at the point that moved farthest.
-    fn new(body: &Body, points: &[Vec3], eye: Vec3, radius_m: f32) -> Self {
+    /// Looks from far away, a little from the side, at the point that moved farthest.
+    fn new(body: &Body, points: &[Vec3], radius_m: f32) -> Self {
         let exact: Vec<DVec3> = points.iter().map(|p| p.as_dvec3()).collect();
         let moved = |point: usize| points[point].distance_squared(body.mesh.points[point]);
         let farthest = (0..points.len())
@@ -110,7 +105,8 @@ impl View {
             .expect("an organ has points");
         let triangles = body.mesh.point_triangles();
         let middle = exact[farthest];
-        let to_eye = (eye.as_dvec3() - middle).normalize();
+        let normal = body.normals[farthest].as_dvec3();
+        let to_eye = (normal + 0.5 * normal.any_orthonormal_vector()).normalize();
         let right = DVec3::Y.cross(to_eye).normalize();
         let up = to_eye.cross(right);
         let tilt = LIGHT_DEG.to_radians();
@@ -165,7 +161,7 @@ impl View {
         let cos_eye = normal.normalize_or_zero().dot(self.to_eye).max(0.05);
         let far_m = self
             .rays
-            .exit_m((place - 1e-9 * self.to_eye, -self.to_eye))?;
+            .exit_m((place - OFF_M * self.to_eye, -self.to_eye))?;
         Some(Sight {
             eye: 0,
             corners,
@@ -176,7 +172,11 @@ impl View {
             cos_lights: [0.0; 3],
             reach_m: (0.5 * self.radius_m / cos_eye).min(self.radius_m),
             far_m,
-            is_shaded: [false; 3],
+            is_shaded: [normal.dot(self.to_light) > 0.0
+                && self
+                    .rays
+                    .is_blocked((place + OFF_M * self.to_eye, self.to_light), 0.0);
+                3],
             is_poked: false,
         })
     }
@@ -195,6 +195,10 @@ impl View {
 
     fn estimate(&self, sight: &Sight, drawn: &Drawn) -> DVec3 {
         let cover = drawn.cover(sight);
+        // As the product draws it: one look at the shadow of the point, unless the ways see shadows themselves.
+        if sight.is_shaded[0] && !drawn.sees_shadows() {
+            return DVec3::ZERO;
+        }
         self.radiance(sight, |_, t| cover.way_m(sight, 0, t, Blend::Squared))
     }
 }

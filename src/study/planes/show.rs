@@ -248,6 +248,7 @@ fn kinds(rows: &[&PlanesRow]) -> Table {
         "poked part",
         "with shadows",
         "published",
+        "left in place",
         "‖KM‖",
     ];
     let lines = methods(rows).into_iter().map(|method| {
@@ -263,6 +264,7 @@ fn kinds(rows: &[&PlanesRow]) -> Table {
             percent(poke(method, |m| m.radiance_error_poked_rel)),
             of(|m| m.radiance_error_with_shadows_rel),
             of(|m| m.radiance_error_published_rel),
+            of(|m| m.radiance_error_in_place_rel),
             of(|m| m.km_error_rel),
         ]
     });
@@ -453,6 +455,8 @@ mod tests {
                 radiance_error_poked_rel: Some(error),
                 radiance_error_with_shadows_rel: None,
                 radiance_error_published_rel: None,
+                radiance_error_in_place_rel: None,
+                radiance_error_in_place_poked_rel: None,
                 oracle: String::new(),
             },
             cost: Cost::default(),
@@ -468,7 +472,7 @@ mod tests {
             row(LightPathMethod::Incremental, Deformation::Poke, 1.0, 0.11),
         ];
         let findings = findings(&rows);
-        let text = findings.text();
+        let text = findings.text().replace('\n', " ");
         assert!(
             text.contains("full 10.0 %, incremental 11.0 %, stale 40.0 %"),
             "{text}"

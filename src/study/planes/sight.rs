@@ -22,7 +22,7 @@ const COS_EYE_MIN: f64 = 0.05;
 /// Light that is left at the radius of a patch: ε of François 2006, section 2.2.
 const EPSILON: f64 = 0.01;
 /// How far rays start off the triangle that a place lies on [m].
-const OFF_M: f64 = 1e-9;
+pub const OFF_M: f64 = 1e-9;
 const SEED: u64 = 2010;
 
 /// A point of the surface, the eye that sees it, and how far it looks in.

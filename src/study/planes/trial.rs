@@ -102,9 +102,14 @@ impl Bench {
         };
         let fits = exact.errors(cell.method, &run.drawn, &run.points, self.threads);
         let (mut errors, mut published) = (Errors::default(), None);
+        let mut in_place = Errors::default();
         if cell.sights > 0 {
             let truth = self.truth(cell, &body, &pose, f64::from(radius_m));
             errors = errors_of(&truth, &run.drawn, Blend::Squared);
+            if cell.method == LightPathMethod::Stale {
+                let left = run.drawn.left_in_place(&body.mesh.points, &run.points);
+                in_place = errors_of(&truth, &left, Blend::Published);
+            }
             if matches!(run.drawn.primitives, DrawnPrimitives::Planes(_)) {
                 published = errors_of(&truth, &run.drawn, Blend::Published).radiance;
             }
@@ -130,6 +135,8 @@ impl Bench {
             radiance_error_poked_rel: errors.poked.and_then(finite),
             radiance_error_with_shadows_rel: errors.shadowed.and_then(finite),
             radiance_error_published_rel: published.and_then(finite),
+            radiance_error_in_place_rel: in_place.radiance.and_then(finite),
+            radiance_error_in_place_poked_rel: in_place.poked.and_then(finite),
             oracle: "f64 rays at the deformed triangles; f64 fits".to_owned(),
         };
         Ok(Row {
@@ -313,6 +320,8 @@ fn refused(cell: &Cell, body: &Body, exact: &Exact, error: &GpuError) -> Row<Cel
             radiance_error_poked_rel: None,
             radiance_error_with_shadows_rel: None,
             radiance_error_published_rel: None,
+            radiance_error_in_place_rel: None,
+            radiance_error_in_place_poked_rel: None,
             oracle: "none".to_owned(),
         },
         cost: Cost::default(),
@@ -354,6 +363,12 @@ mod tests {
         let twist = Deformation::Twist;
         let (of_stale, of_full) = (error(stale, twist), error(full, twist));
         assert!(of_stale > 1.1 * of_full, "{of_stale} and {of_full}");
+        let row = bench.measure(&cell(stale, twist)).expect("it is measured");
+        let in_place = row.measures.radiance_error_in_place_rel;
+        assert!(
+            in_place.expect("it is stale") > 1.5 * of_full,
+            "{in_place:?} and {of_full}"
+        );
         let rest = error(full, Deformation::Rest);
         assert!((error(stale, Deformation::Rest) / rest - 1.0).abs() < 1e-3);
     }
