@@ -22,6 +22,8 @@ use std::sync::{Mutex, PoisonError};
 
 /// A change of the picture below this is none [share of the range, RMS over covered pixels]: a third of a level of 8 bits.
 const NOTHING: f64 = 0.0013;
+/// A share of the frame below this is no cost: what the timing can't tell.
+const NO_COST_SHARE: f64 = 0.03;
 /// A channel that differs by so many levels is seen.
 const SEEN_LEVELS: u8 = 3;
 /// Frames before those that are timed.
@@ -52,8 +54,8 @@ pub enum Feature {
     Relief,
     /// Highlights and mirrored room.
     Wetness,
-    /// The second half of the samples.
-    Samples,
+    /// Twice the samples.
+    MoreSamples,
     /// The blur of the light map.
     Blur,
     /// The opacity map over the inner layer.
@@ -71,7 +73,7 @@ impl Feature {
         Self::ColorBlend,
         Self::Relief,
         Self::Wetness,
-        Self::Samples,
+        Self::MoreSamples,
         Self::Blur,
         Self::Parallax,
     ];
@@ -87,7 +89,7 @@ impl Feature {
             Self::ColorBlend => "color-blend",
             Self::Relief => "relief",
             Self::Wetness => "wetness",
-            Self::Samples => "samples",
+            Self::MoreSamples => "more-samples",
             Self::Blur => "blur",
             Self::Parallax => "parallax",
         }
@@ -110,7 +112,7 @@ impl Feature {
             Self::ColorBlend => if_has(layered, surface.color_blend > 0.0),
             Self::Relief => Some(surface.relief > 0.0),
             Self::Wetness => Some(surface.wetness > 0.0),
-            Self::Samples => if_has(layered, surface.samples > 1),
+            Self::MoreSamples => if_has(layered, false),
             Self::Blur => if_has(gooey, surface.blur_passes > 0),
             Self::Parallax => if_has(gooey, surface.layer_distance_m > 0.0),
         }
@@ -155,7 +157,7 @@ impl Feature {
             Self::ColorBlend => knob(&mut surface.color_blend, standard.color_blend),
             Self::Relief => knob(&mut surface.relief, standard.relief),
             Self::Wetness => knob(&mut surface.wetness, standard.wetness),
-            Self::Samples => surface.samples = surface.samples.div_ceil(2),
+            Self::MoreSamples => surface.samples *= 2,
             Self::Blur => {
                 surface.blur_passes = if is_on { 0 } else { standard.blur_passes };
             }
@@ -217,14 +219,6 @@ struct Shown {
     session: Session,
     renderer: Renderer,
     points: Vec<Vec3>,
-    plain: Drawing,
-}
-
-/// What a frame looks like and takes.
-struct Drawing {
-    picture: RgbaImage,
-    depth: Vec<f32>,
-    ms: Option<(f64, f64)>,
 }
 
 impl Sweep for Minimal {
@@ -312,14 +306,10 @@ impl Shown {
             session.tick();
         }
         let gpu = Gpu::headless().map_err(AppError::Gpu)?;
-        let mut renderer = Renderer::new(gpu, &session, cell.size)?;
-        let points = session.points().to_vec();
-        let plain = draw(&mut renderer, &session, &points, cell.frames)?;
         Ok(Self {
+            renderer: Renderer::new(gpu, &session, cell.size)?,
+            points: session.points().to_vec(),
             session,
-            renderer,
-            points,
-            plain,
         })
     }
 
@@ -330,24 +320,37 @@ impl Shown {
         };
         let scene = self.session.scene.clone();
         self.session.scene = cell.feature.toggled(&scene);
-        let drawn = self
-            .renderer
-            .rebuilt(&self.session)
-            .and_then(|mut renderer| draw(&mut renderer, &self.session, &self.points, cell.frames));
+        let rebuilt = self.renderer.rebuilt(&self.session);
         self.session.scene = scene;
-        let other = drawn?;
-        let (with, without) = if on {
-            (self.plain.ms, other.ms)
-        } else {
-            (other.ms, self.plain.ms)
-        };
-        let (change_rms, changed_share) = change(&self.plain, &other.picture);
-        let p50 = |ms: Option<(f64, f64)>| ms.map(|(p50, _)| p50);
+        let mut other = rebuilt?;
+        // By turns, so that a busy machine is as busy for both.
+        let (mut with, mut without, mut costs) = (Vec::new(), Vec::new(), Vec::new());
+        for frame in 0..WARM_UP + cell.frames {
+            let [plain_ms, other_ms] = [&mut self.renderer, &mut other]
+                .map(|renderer| draw(renderer, &self.session, &self.points, Some(frame)));
+            let (plain_ms, other_ms) = (plain_ms?, other_ms?);
+            let (on_ms, off_ms) = if on {
+                (plain_ms, other_ms)
+            } else {
+                (other_ms, plain_ms)
+            };
+            if frame >= WARM_UP && on_ms > 0.0 {
+                with.push(on_ms);
+                without.push(off_ms);
+                costs.push(on_ms - off_ms);
+            }
+        }
+        draw(&mut self.renderer, &self.session, &self.points, None)?;
+        draw(&mut other, &self.session, &self.points, None)?;
+        let depth = self.renderer.depth()?;
+        let (change_rms, changed_share) =
+            change(&self.renderer.picture()?, &other.picture()?, &depth);
+        let (with, without) = (Stats::of(with), Stats::of(without));
         let measures = Measures {
             is_on,
-            on_ms_p50: p50(with),
-            off_ms_p50: p50(without),
-            cost_ms: p50(with).zip(p50(without)).map(|(on, off)| on - off),
+            on_ms_p50: with.map(|stats| stats.p50),
+            off_ms_p50: without.map(|stats| stats.p50),
+            cost_ms: Stats::of(costs).map(|stats| stats.p50),
             change_rms: finite(change_rms),
             changed_share: finite(changed_share),
             oracle: "its own picture".to_owned(),
@@ -356,8 +359,8 @@ impl Shown {
             cell: cell.clone(),
             verdict: verdict(&measures),
             cost: Cost {
-                ms_p50: p50(with),
-                ms_p95: with.map(|(_, p95)| p95),
+                ms_p50: with.map(|stats| stats.p50),
+                ms_p95: with.map(|stats| stats.p95),
             },
             measures,
         })
@@ -381,41 +384,31 @@ fn unused(cell: &Cell) -> Row<Cell, Measures> {
     }
 }
 
-/// Draws the body at rest, then where it lies, so often.
+/// GPU time [ms] of one frame of the body where it lies; nearby with a number of the frame.
 fn draw(
     renderer: &mut Renderer,
     session: &Session,
     points: &[Vec3],
-    frames: u32,
-) -> Result<Drawing, AppError> {
+    frame: Option<u32>,
+) -> Result<f32, AppError> {
     let orbit = renderer.scene_orbit(session);
-    let mut times = Vec::new();
-    for frame in 0..WARM_UP + frames {
-        // All of it moves all the time, by less than is seen: the cost is that of prodding, not of sleep.
-        let away = 1e-5 * (1.3 * frame as f32).sin();
-        let moved: Vec<Vec3> = (points.iter().enumerate())
-            .map(|(i, &p)| {
-                p + away * (1.0 + 0.5 * (0.1 * i as f32).sin()) * Vec3::new(0.6, 0.64, 0.48)
-            })
-            .collect();
-        let drawn = renderer.draw(&moved, &orbit, &[])?;
-        if frame >= WARM_UP {
-            times.push(drawn.passes.iter().map(|pass| pass.gpu_ms).sum::<f32>());
-        }
-    }
-    renderer.draw(points, &orbit, &[])?;
-    Ok(Drawing {
-        picture: renderer.picture()?,
-        depth: renderer.depth()?,
-        ms: Stats::of(times.into_iter().filter(|ms| *ms > 0.0)).map(|s| (s.p50, s.p95)),
-    })
+    // All of it moves all the time, by less than is seen: the cost is that of prodding, not of sleep.
+    let away = frame.map_or(0.0, |frame| 1e-5 * (1.3 * frame as f32).sin());
+    let moved: Vec<Vec3> = (points.iter().enumerate())
+        .map(|(i, &p)| {
+            let wave = 1.0 + 0.5 * (0.1 * i as f32).sin();
+            p + away * wave * Vec3::new(0.6, 0.64, 0.48)
+        })
+        .collect();
+    let drawn = renderer.draw(&moved, &orbit, &[])?;
+    Ok(drawn.passes.iter().map(|pass| pass.gpu_ms).sum())
 }
 
 /// RMS of the difference as a share of the range, and the share of covered pixels in which it is seen.
-fn change(plain: &Drawing, other: &RgbaImage) -> (f64, f64) {
+fn change(plain: &RgbaImage, other: &RgbaImage, depth: &[f32]) -> (f64, f64) {
     let (mut sum, mut seen, mut covered) = (0.0, 0_u32, 0_u32);
-    let pixels = plain.picture.pixels().zip(other.pixels());
-    for ((a, b), _) in pixels.zip(&plain.depth).filter(|(_, depth)| **depth < 1.0) {
+    let pixels = plain.pixels().zip(other.pixels());
+    for ((a, b), _) in pixels.zip(depth).filter(|(_, depth)| **depth < 1.0) {
         let apart = [0, 1, 2].map(|k| a.0[k].abs_diff(b.0[k]));
         covered += 1;
         seen += u32::from(apart.into_iter().max() >= Some(SEEN_LEVELS));
@@ -432,8 +425,14 @@ fn change(plain: &Drawing, other: &RgbaImage) -> (f64, f64) {
 fn verdict(measures: &Measures) -> Verdict {
     let mut faults = Vec::new();
     let changes_nothing = measures.change_rms.is_some_and(|change| change < NOTHING);
-    if measures.is_on == Some(true) && changes_nothing {
-        faults.push((State::Degraded, "it changes nothing and is on".to_owned()));
+    let share = measures
+        .cost_ms
+        .zip(measures.on_ms_p50)
+        .map(|(cost, on)| cost / on);
+    let costs = share.is_none_or(|share| share > NO_COST_SHARE);
+    if measures.is_on == Some(true) && changes_nothing && costs {
+        let problem = "it is on, costs time and changes nothing".to_owned();
+        faults.push((State::Degraded, problem));
     }
     Verdict::of(faults)
 }
@@ -447,9 +446,12 @@ fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
         .map(|row| format!("{} of {}", row.cell.feature.name(), row.cell.scene))
         .collect();
     let lead = if wasted.is_empty() {
-        "Everything that is on changes the picture.".to_owned()
+        "Everything that is on and costs time changes the picture.".to_owned()
     } else {
-        format!("On without changing the picture: {}.", wasted.join(", "))
+        format!(
+            "On, at a cost, without changing the picture: {}.",
+            wasted.join(", ")
+        )
     };
     let head = [
         "scene",
@@ -548,7 +550,7 @@ mod tests {
                 };
                 let once = feature.toggled(&scene);
                 assert_ne!(once, scene, "{name}: {feature:?}");
-                if feature != Feature::Samples {
+                if feature != Feature::MoreSamples {
                     assert_eq!(feature.is_on(&once), Some(!on), "{name}: {feature:?}");
                     assert_eq!(feature.is_on(&feature.toggled(&once)), Some(on));
                 }
@@ -559,16 +561,12 @@ mod tests {
     #[test]
     fn change_counts_covered_pixels_alone_and_what_changes_nothing_should_be_off() {
         let grey = |level| RgbaImage::from_pixel(2, 1, image::Rgba([level, level, level, 255]));
-        let plain = Drawing {
-            picture: grey(100),
-            depth: vec![0.5, 1.0],
-            ms: None,
-        };
+        let (plain, depth) = (grey(100), [0.5, 1.0]);
         let mut other = grey(100);
         other.put_pixel(1, 0, image::Rgba([0; 4]));
-        assert_eq!(change(&plain, &other), (0.0, 0.0));
+        assert_eq!(change(&plain, &other, &depth), (0.0, 0.0));
         other.put_pixel(0, 0, image::Rgba([151, 100, 100, 255]));
-        let (rms, seen) = change(&plain, &other);
+        let (rms, seen) = change(&plain, &other, &depth);
         assert!((rms - (0.04_f64 / 3.0).sqrt()).abs() < 1e-12 && seen == 1.0);
         let measures = |is_on, change_rms| Measures {
             is_on,

@@ -1,10 +1,11 @@
 //! One picture: a bundled organ in the middle of its script, poked, as each method lights it, beside the truth by
-//! rays, and how far off each pixel is.
+//! rays, and how far off each pixel is. Planes left in place are those of the rest pose, where they were in space, blended
+//! as published.
 
 use super::Plan;
 use super::body::Body;
 use super::estimate::{Blend, Drawn};
-use super::sight::{OFF_M, SAMPLES, Sight, exact_normals};
+use super::sight::{OFF_M, SAMPLES, Sight, exact_normals, is_shaded};
 use super::trial::Bench;
 use crate::app::{AppError, Session, load_scene};
 use crate::geom::plane::LightPathMethod;
@@ -67,13 +68,20 @@ pub fn write(bench: &Bench, plan: &Plan, out: &Path) -> Result<(), AppError> {
     for method in METHODS {
         let lights = [[view.to_light; 3]];
         let drawn = bench.drawn(&body, method, radius_m, &points, &lights)?;
-        let lit = all_by(bench.threads(), &sights, |sight| {
-            sight
-                .as_ref()
-                .map_or(DVec3::ZERO, |sight| view.estimate(sight, &drawn))
-        });
-        let error = relative_error(&lit, &truth);
-        panels.push((format!("{} {:.1}%", method.name(), 100.0 * error), lit));
+        let mut add = |name: &str, drawn: &Drawn, blend: Blend| {
+            let lit = all_by(bench.threads(), &sights, |sight| {
+                sight
+                    .as_ref()
+                    .map_or(DVec3::ZERO, |sight| view.estimate(sight, drawn, blend))
+            });
+            let error = relative_error(&lit, &truth);
+            panels.push((format!("{name} {:.1}%", 100.0 * error), lit));
+        };
+        if method == LightPathMethod::Stale {
+            let left = drawn.left_in_place(&body.mesh.points, &points);
+            add("left in place", &left, Blend::Published);
+        }
+        add(method.name(), &drawn, Blend::Squared);
     }
     let picture = sheet(&panels, side);
     Ok(files::write_png(&out.join("planes.png"), &picture)?)
@@ -172,11 +180,7 @@ impl View {
             cos_lights: [0.0; 3],
             reach_m: (0.5 * self.radius_m / cos_eye).min(self.radius_m),
             far_m,
-            is_shaded: [normal.dot(self.to_light) > 0.0
-                && self
-                    .rays
-                    .is_blocked((place + OFF_M * self.to_eye, self.to_light), 0.0);
-                3],
+            is_shaded: [is_shaded(&self.rays, place, self.to_light, self.radius_m); 3],
             is_poked: false,
         })
     }
@@ -193,13 +197,13 @@ impl View {
             .sum()
     }
 
-    fn estimate(&self, sight: &Sight, drawn: &Drawn) -> DVec3 {
+    fn estimate(&self, sight: &Sight, drawn: &Drawn, blend: Blend) -> DVec3 {
         let cover = drawn.cover(sight);
         // As the product draws it: one look at the shadow of the point, unless the ways see shadows themselves.
         if sight.is_shaded[0] && !drawn.sees_shadows() {
             return DVec3::ZERO;
         }
-        self.radiance(sight, |_, t| cover.way_m(sight, 0, t, Blend::Squared))
+        self.radiance(sight, |_, t| cover.way_m(sight, 0, t, blend))
     }
 }
 

@@ -210,10 +210,16 @@ impl Look {
             far_m,
             is_shaded: self
                 .to_lights
-                .map(|light| rays.is_blocked((place + OFF_M * self.to_eye, light), 0.0)),
+                .map(|light| is_shaded(rays, place, light, self.radius_m)),
             is_poked: at_rest.distance(poked) < POKED_SHARE * body.size_m,
         })
     }
+}
+
+/// Whether something stands between `place` and a light: not the surface round it, whose facets rise before each
+/// other where light grazes, and which is the light path's to know.
+pub fn is_shaded(rays: &Rays, place: DVec3, to_light: DVec3, radius_m: f64) -> bool {
+    rays.is_blocked((place, to_light), 0.5 * radius_m)
 }
 
 fn ways(sight: &Sight, rays: &Rays) -> Ways {

@@ -126,7 +126,11 @@ impl Bench {
             refit_ms_p50: refit.map(|(p50, _)| p50),
             refit_ms_p95: refit.map(|(_, p95)| p95),
             normal_error_deg_p99: fits.normal_deg_p99.and_then(finite),
-            kernel_error_deg_p999: fits.kernel_deg_p999.and_then(finite),
+            // What is passed over on purpose is no error of the kernel.
+            kernel_error_deg_p999: (cell.skip_optical_depth == 0.0)
+                .then_some(fits.kernel_deg_p999)
+                .flatten()
+                .and_then(finite),
             km_error_rel: errors.km.and_then(finite),
             radiance_error_rel: errors.radiance.and_then(finite),
             radiance_error_front_rel: errors.front.and_then(finite),
