@@ -16,7 +16,7 @@ const COLUMNS: usize = 2;
 /// What the charts show of the cost [ms]; methods without a pass stand at the left edge.
 const MS_RANGE: (f64, f64) = (0.01, 1000.0);
 /// What the charts show of the error [%].
-const ERROR_RANGE: (f64, f64) = (1.0, 200.0);
+const ERROR_RANGE: (f64, f64) = (0.1, 100.0);
 /// The size of mesh that charts show, or what is nearest to it.
 const SHOWN_VERTICES: u32 = 10_000;
 
@@ -155,7 +155,7 @@ fn charts(rows: &[&PlanesRow]) -> Vec<(String, String)> {
     deformations
         .into_iter()
         .map(|deformation| {
-            let clouds = LightPathMethod::ALL
+            let mut clouds: Vec<Cloud> = LightPathMethod::ALL
                 .into_iter()
                 .enumerate()
                 .filter(|(_, method)| methods(rows).contains(method))
@@ -164,19 +164,20 @@ fn charts(rows: &[&PlanesRow]) -> Vec<(String, String)> {
                     look,
                     hollow: false,
                     joined: true,
-                    points: radii(rows)
-                        .into_iter()
-                        .filter_map(|radius| {
-                            let row = row_of(rows, method, deformation, radius)?;
-                            Some(Point {
-                                x: row.measures.refit_ms_p50.unwrap_or(0.0).max(MS_RANGE.0),
-                                y: row.measures.radiance_error_rel.map(|error| 100.0 * error),
-                                label: share_name(radius),
-                            })
-                        })
-                        .collect(),
+                    points: points(rows, method, deformation, |m| m.radiance_error_rel),
                 })
                 .collect();
+            let stale = LightPathMethod::Stale;
+            let left = points(rows, stale, deformation, |m| m.radiance_error_in_place_rel);
+            if !left.is_empty() {
+                clouds.push(Cloud {
+                    label: "stale, left in place".to_owned(),
+                    look: LightPathMethod::ALL.len(),
+                    hollow: true,
+                    joined: false,
+                    points: left,
+                });
+            }
             let chart = ScatterChart {
                 size_px: CHART_PX,
                 title: deformation.name().to_owned(),
@@ -187,6 +188,26 @@ fn charts(rows: &[&PlanesRow]) -> Vec<(String, String)> {
                 clouds,
             };
             (deformation.name().to_owned(), chart.svg())
+        })
+        .collect()
+}
+
+/// A point a radius for what `measure` is known of.
+fn points(
+    rows: &[&PlanesRow],
+    method: LightPathMethod,
+    deformation: Deformation,
+    measure: impl Fn(&Measures) -> Option<f64>,
+) -> Vec<Point> {
+    radii(rows)
+        .into_iter()
+        .filter_map(|radius| {
+            let row = row_of(rows, method, deformation, radius)?;
+            Some(Point {
+                x: row.measures.refit_ms_p50.unwrap_or(0.0).max(MS_RANGE.0),
+                y: Some(100.0 * measure(&row.measures)?),
+                label: share_name(radius),
+            })
         })
         .collect()
 }
