@@ -103,7 +103,11 @@ impl Scene<'_> {
                 let got = Quadric { squares, products };
                 let reach = 0.5 * self.exact.radius_m;
                 let apart = |exact: DMat3| slope_deg(&got, exact, normal, reach);
-                let counts = |member: usize| self.normal(member).dot(normal) > 0.0;
+                // As in `geom::quadric`: what is steeper than 45 degrees is another sheet.
+                let counts = |member: usize| {
+                    let d = self.place(member) - at;
+                    2.0 * d.dot(normal).powi(2) <= d.length_squared()
+                };
                 let members = self.exact.patches.members(point).filter(|&m| counts(m));
                 let to_middle = |member: usize| {
                     let d = self.place(member).distance(at) / self.exact.radius_m;
