@@ -92,7 +92,7 @@ impl Stage {
         let times = self.timer.read(&self.gpu)?;
         let refit = times.iter().filter(|time| time.name != Tangents::NAME);
         Ok(FrameTimes {
-            refit: Some(refit.map(|time| time.gpu_ms).sum()),
+            refit: Some(refit.fold(0.0, |sum, time| sum + time.gpu_ms)),
             all: Some(times.iter().map(|time| time.gpu_ms).sum()),
         })
     }
