@@ -180,7 +180,10 @@ impl View {
             cos_lights: [0.0; 3],
             reach_m: (0.5 * self.radius_m / cos_eye).min(self.radius_m),
             far_m,
-            is_shaded: [is_shaded(&self.rays, place, self.to_light, self.radius_m); 3],
+            // What faces away is lit through the body or not at all: the way itself tells.
+            is_shaded: [normal.dot(self.to_light) > 0.0
+                && is_shaded(&self.rays, place, self.to_light, self.radius_m);
+                3],
             is_poked: false,
         })
     }
