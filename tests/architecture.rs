@@ -50,6 +50,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
 const CRATE_PLACES: &[(&str, &[&str])] = &[
     ("winit", &["app/"]),
     ("egui", &["app/"]),
+    ("bvh", &["reference/"]),
     ("faer", &["reference/"]),
     ("gltf", &["geom/import"]),
     ("tobj", &["geom/"]),

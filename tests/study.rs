@@ -293,3 +293,64 @@ fn settings_that_make_no_study_are_refused_with_what_would() {
     );
     assert!(names(&out).is_empty(), "{:?}", names(&out));
 }
+
+#[test]
+fn study_of_light_paths_writes_the_rows_that_scripts_read() {
+    let out = folder("study-planes");
+    let command = [
+        "study",
+        "planes",
+        "--quick",
+        "--out",
+        &out.display().to_string(),
+        "--set",
+        "body.vertices=600",
+        "--set",
+        "light_path.radius_share=0.1",
+        "--set",
+        "light_path.skip_optical_depth=0.0",
+        "--set",
+        "light_path.method=[\"stale\", \"full\"]",
+        "--set",
+        "motion.deformation=[\"rest\", \"twist\"]",
+        "--set",
+        "drift.frames=0",
+        "--set",
+        "oracle.picture_px=16",
+    ];
+    succeeded(&palpate(&command).output().expect("it runs"));
+    let text = std::fs::read_to_string(out.join("planes.json")).expect("it was written");
+    let document: Value = serde_json::from_str(&text).expect("is JSON");
+    assert_ne!(document["adapter"], "none");
+    let rows = document["rows"].as_array().expect("has rows");
+    assert_eq!(rows.len(), 4);
+    for row in rows {
+        for key in [
+            "method",
+            "deformation",
+            "radius_share",
+            "vertices",
+            "moved_share",
+            "refit_ms_p50",
+            "normal_error_deg_p99",
+            "km_error_rel",
+            "radiance_error_rel",
+            "oracle",
+            "state",
+        ] {
+            assert!(!row[key].is_null(), "{key} of {row}");
+        }
+    }
+    let error = |row: usize| rows[row]["radiance_error_rel"].as_f64().expect("a number");
+    // Stale at rest, stale and full in a twist.
+    assert!(error(0) < error(1) && error(3) < error(1));
+    for name in ["planes.csv", "planes.svg", "planes.png", "report.html"] {
+        assert!(out.join(name).is_file(), "{name}");
+    }
+    refused(
+        &palpate(&["study", "planes", "--set", "light_path.radius_share=0.9"])
+            .output()
+            .expect("it runs"),
+        &["light_path.radius_share", "0.001 to 0.5"],
+    );
+}

@@ -22,6 +22,7 @@ pub use check::check;
 pub use error::AppError;
 pub use load::{LoadedBody, body as load_body, scene as load_scene};
 pub use record::start_clock;
+pub use renderer::Renderer;
 pub use replay::{ReplayOptions, replay};
 pub use session::{Marker, Session, Tick};
 pub use window::{WindowOptions, window};

@@ -19,6 +19,7 @@ pub use bundle::{BundledFile, bundled_files};
 
 use super::SurfaceMesh;
 use super::unwrap::unwrap;
+use field::Shape;
 use glam::Vec3;
 
 /// An organ that comes with the program.
@@ -80,13 +81,30 @@ impl Organ {
 
     /// Points [m] and triangles, before unwrapping.
     pub fn surface(self) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-        let shape = match self {
+        surface::surface(&self.shape())
+    }
+
+    /// The same surface of about so many points, more than a few hundred.
+    pub fn surface_of_about(self, points: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+        let own = self.shape();
+        let rough = Shape {
+            cell: 2.0 * own.cell,
+            ..own
+        };
+        let share = dual::dual_mesh(&rough).0.len() as f32 / points as f32;
+        surface::surface(&Shape {
+            cell: rough.cell * share.sqrt(),
+            ..own
+        })
+    }
+
+    fn shape(self) -> Shape {
+        match self {
             Self::Liver => liver::SHAPE,
             Self::Heart => heart::SHAPE,
             Self::Kidney => kidney::SHAPE,
             Self::Spleen => spleen::SHAPE,
-        };
-        surface::surface(&shape)
+        }
     }
 
     /// What lies at `place_m` beside the tissue that the organ is made of.

@@ -2,6 +2,7 @@
 //! they end in. Plain data in, files out; nothing here knows of bodies, passes or scenes.
 
 pub mod against;
+pub mod caption;
 pub mod chart;
 pub mod files;
 pub mod log;

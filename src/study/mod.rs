@@ -10,16 +10,19 @@ mod findings;
 mod held_body;
 mod journal;
 mod merge;
+mod minimal;
 mod oracle;
 mod output;
 mod peers;
 mod plan;
+mod planes;
 mod pokes;
 mod random;
 mod run;
 mod shard;
 mod solver;
 mod stability;
+mod stretch;
 mod sweep;
 mod timing;
 
@@ -27,11 +30,14 @@ pub use shard::Shard;
 
 use crate::app::{AppError, Outcome};
 use crate::measure::page::Section;
+use minimal::Minimal;
+use planes::Planes;
 use pokes::Pokes;
 use serde::{Deserialize, Serialize};
 use solver::Solver;
 use stability::Stability;
 use std::path::{Path, PathBuf};
+use stretch::Stretch;
 
 /// Version and commit, as rows are marked with.
 const VERSION: (&str, &str) = (env!("CARGO_PKG_VERSION"), env!("PALPATE_COMMIT"));
@@ -40,6 +46,12 @@ const VERSION: (&str, &str) = (env!("CARGO_PKG_VERSION"), env!("PALPATE_COMMIT")
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Study {
+    /// Light below a moving surface: what each method costs, and how wrong it is.
+    Planes,
+    /// How deep layers seem where the surface is stretched.
+    Stretch,
+    /// What each optional feature costs and changes.
+    Minimal,
     /// How far off each method is, and what it costs.
     Solver,
     /// Where each method fails, and why.
@@ -50,11 +62,21 @@ pub enum Study {
 
 impl Study {
     /// Every study.
-    pub const ALL: [Self; 3] = [Self::Solver, Self::Stability, Self::Pokes];
+    pub const ALL: [Self; 6] = [
+        Self::Planes,
+        Self::Stretch,
+        Self::Minimal,
+        Self::Solver,
+        Self::Stability,
+        Self::Pokes,
+    ];
 
     /// The name on the command line and of the files.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Planes => "planes",
+            Self::Stretch => "stretch",
+            Self::Minimal => "minimal",
             Self::Solver => "solver",
             Self::Stability => "stability",
             Self::Pokes => "pokes",
@@ -69,6 +91,9 @@ impl Study {
     /// The heading of its section in the report.
     fn title(self) -> &'static str {
         match self {
+            Self::Planes => "Light below a moving surface: time a frame against error",
+            Self::Stretch => "Layers under stretch",
+            Self::Minimal => "What each feature costs and changes",
             Self::Solver => "The solver: time a frame against error",
             Self::Stability => "Stability: where each method fails",
             Self::Pokes => "Pokes: many, anywhere, at any speed",
@@ -77,6 +102,9 @@ impl Study {
 
     fn run(self, options: &StudyOptions) -> Result<Outcome, AppError> {
         match self {
+            Self::Planes => run::run::<Planes>(options),
+            Self::Stretch => run::run::<Stretch>(options),
+            Self::Minimal => run::run::<Minimal>(options),
             Self::Solver => run::run::<Solver>(options),
             Self::Stability => run::run::<Stability>(options),
             Self::Pokes => run::run::<Pokes>(options),
@@ -85,6 +113,9 @@ impl Study {
 
     fn merge(self, out: &Path, parts: &[PathBuf]) -> Result<Outcome, AppError> {
         match self {
+            Self::Planes => merge::merge::<Planes>(out, parts),
+            Self::Stretch => merge::merge::<Stretch>(out, parts),
+            Self::Minimal => merge::merge::<Minimal>(out, parts),
             Self::Solver => merge::merge::<Solver>(out, parts),
             Self::Stability => merge::merge::<Stability>(out, parts),
             Self::Pokes => merge::merge::<Pokes>(out, parts),
@@ -93,6 +124,9 @@ impl Study {
 
     fn section(self, out: &Path) -> Result<Section, AppError> {
         match self {
+            Self::Planes => output::section::<Planes>(out),
+            Self::Stretch => output::section::<Stretch>(out),
+            Self::Minimal => output::section::<Minimal>(out),
             Self::Solver => output::section::<Solver>(out),
             Self::Stability => output::section::<Stability>(out),
             Self::Pokes => output::section::<Pokes>(out),

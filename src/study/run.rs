@@ -38,7 +38,7 @@ pub fn run<S: Sweep>(options: &StudyOptions) -> Result<Outcome, AppError> {
         study: S::STUDY,
         version: VERSION.0.to_owned(),
         commit: VERSION.1.to_owned(),
-        adapter: "none".to_owned(),
+        adapter: S::adapter()?,
         cpu: machine(),
         threads: options.threads,
         shard: options.shard,
@@ -72,6 +72,7 @@ pub fn run<S: Sweep>(options: &StudyOptions) -> Result<Outcome, AppError> {
             Ok(())
         })?;
         bar.finish_and_clear();
+        sweep.finish()?;
     }
     let in_order = |cell: &S::Cell| rows.remove(&key(cell)).expect("every cell has its row");
     let document = Document {

@@ -30,6 +30,15 @@ pub trait Sweep: Sync + Sized {
     /// The value that can't be used, with the allowed range.
     fn cells(plan: &Self::Plan) -> Result<Vec<Self::Cell>, String>;
 
+    /// The GPU adapter that times and results depend on; `"none"` for a study that needs no GPU.
+    ///
+    /// # Errors
+    ///
+    /// [`AppError::Gpu`] if it needs one and there is none.
+    fn adapter() -> Result<String, AppError> {
+        Ok("none".to_owned())
+    }
+
     /// Reads and makes what all cells share. `out` is where costly oracles are kept.
     ///
     /// # Errors
@@ -43,6 +52,15 @@ pub trait Sweep: Sync + Sized {
     ///
     /// [`AppError`] if a file can't be read or written; a method that fails is a row, not an error.
     fn measure(&self, cell: &Self::Cell) -> Result<RowOf<Self>, AppError>;
+
+    /// Writes what is no row, such as pictures, once all cells are measured.
+    ///
+    /// # Errors
+    ///
+    /// [`AppError`] naming the file that can't be written.
+    fn finish(&self) -> Result<(), AppError> {
+        Ok(())
+    }
 
     /// Tables, charts and what they say, from the rows alone.
     fn findings(rows: &[RowOf<Self>]) -> Findings;
