@@ -6,6 +6,7 @@ use crate::geom::patch::Patches;
 use crate::geom::plane::{LightPathMethod, exact_plane, exact_weighted_plane};
 use crate::geom::quadric::{Quadric, exact_quadric};
 use crate::geom::sample::Samples;
+use crate::geom::tangent::{Fans, rest_normals};
 use crate::measure::stats::{percentile, sorted};
 use crate::reference::all_by;
 use glam::{DMat3, DVec3, Vec3};
@@ -36,10 +37,15 @@ pub struct FitErrors {
 }
 
 impl Exact {
-    /// Patches of `radius_m` and their samples.
-    pub fn new(body: &Body, radius_m: f32) -> Self {
-        let points = &body.mesh.points;
-        let patches = Patches::new(points, &body.normals, radius_m);
+    /// Patches of `radius_m` of the body at rest, moved by `origin_m`, and their samples: where it lies far away,
+    /// places are rounded, and so is what lies within the radius.
+    pub fn new(body: &Body, radius_m: f32, origin_m: Vec3) -> Self {
+        let mut mesh = body.mesh.clone();
+        for point in &mut mesh.points {
+            *point += origin_m;
+        }
+        let points = &mesh.points;
+        let patches = Patches::new(points, &rest_normals(&mesh, &Fans::new(&mesh)), radius_m);
         let members: u64 = (0..points.len())
             .map(|slot| u64::from(patches.member_count(slot)))
             .sum();
@@ -178,7 +184,7 @@ mod tests {
     fn planes_and_paraboloids_of_the_cpu_twins_are_right_and_turned_ones_are_not() {
         let body = Body::of_shape(Shape::Blob, 600, 0.15);
         let (points, radius_m) = (&body.mesh.points, 0.03);
-        let exact = Exact::new(&body, radius_m);
+        let exact = Exact::new(&body, radius_m, Vec3::ZERO);
         let normals: Vec<Vec4> = body.normals.iter().map(|n| n.extend(0.0)).collect();
         let drawn = |primitives| Drawn {
             normals: normals.clone(),

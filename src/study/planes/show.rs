@@ -23,7 +23,10 @@ const SHOWN_VERTICES: u32 = 10_000;
 /// What the rows say.
 pub fn findings(rows: &[PlanesRow]) -> Findings {
     let Some(shown) = shown_body(rows) else {
-        return Findings::default();
+        return Findings {
+            svg: sheet(&[], CHART_PX, 1),
+            blocks: vec![Block::Table(drifts(rows))],
+        };
     };
     let shown: Vec<&PlanesRow> = rows.iter().filter(|row| of_body(row, &shown)).collect();
     let charts = charts(&shown);

@@ -90,8 +90,11 @@ impl Bench {
     pub fn measure(&self, cell: &Cell) -> Result<Row<Cell, Measures>, AppError> {
         let body = self.body(cell)?;
         let radius_m = (cell.radius_share * cell.size_m) as f32;
-        let exact_key = format!("{}|{}", body_key(cell), cell.radius_share);
-        let exact = kept(&self.exact, exact_key, || Ok(Exact::new(&body, radius_m)))?;
+        let exact_key = format!("{}|{}|{}", body_key(cell), cell.radius_share, cell.origin_m);
+        let origin_m = Vec3::X * cell.origin_m as f32;
+        let exact = kept(&self.exact, exact_key, || {
+            Ok(Exact::new(&body, radius_m, origin_m))
+        })?;
         let pose = cell.deformation.apply(&body);
         let run = match self.run(cell, &body, &pose, radius_m) {
             Ok(run) => run,
