@@ -196,7 +196,8 @@ pub struct Corner {
 /// The particles, for the parts of one round to read and write at the same time.
 ///
 /// Sound as long as no two parts that run together name the same particle and every index is
-/// inside: [`Batches`] alone makes batches' corners and accesses, and sees to both.
+/// inside: [`Batches`] alone makes batches' corners, and sees to both while it runs them; an access
+/// made by [`ParticleAccess::reading`] is for as many places, and for nobody else meanwhile.
 #[derive(Clone, Copy)]
 pub struct ParticleAccess {
     first: *mut Vec4,

@@ -14,7 +14,6 @@ use super::{
 };
 use crate::geom::bounds;
 use glam::{Vec3, Vec4};
-use rayon::prelude::*;
 
 /// A body that goes nowhere by more than this many of its sizes is calm.
 const CALM_SIZES: f32 = 1e-4;
@@ -23,8 +22,8 @@ const CALM_SIZES: f32 = 1e-4;
 const CALM_S: f32 = 0.5;
 /// Tetrahedra a chunk, in adding up volumes: some microseconds.
 const TETS_PER_CHUNK: usize = 1024;
-/// Points a task, in bringing the surface up to date.
-const POINTS_PER_TASK: usize = 4096;
+/// Points a chunk, in bringing the surface up to date: some microseconds.
+const POINTS_PER_CHUNK: usize = 1024;
 
 /// A soft body in time.
 #[derive(Debug)]
@@ -113,7 +112,7 @@ impl Simulation {
             setup,
         };
         simulation.calm_places = simulation.particles.places.clone();
-        simulation.publish();
+        simulation.publish(&Team::alone());
         simulation
     }
 
@@ -184,7 +183,7 @@ impl Simulation {
         self.report = StepReport::default();
         self.model.forget(&mut self.particles.places, &self.solver);
         self.wake();
-        self.publish();
+        self.publish(&Team::alone());
     }
 
     /// Puts every free particle to `positions` [m] with `velocities` [m/s]; wakes the body.
@@ -212,7 +211,7 @@ impl Simulation {
         self.model.forget(&mut self.particles.places, &self.solver);
         self.tools.forget_sides();
         self.wake();
-        self.publish();
+        self.publish(&Team::alone());
     }
 
     /// Puts every held particle to where `positions` has it [m], and holds it there; wakes the body.
@@ -236,7 +235,7 @@ impl Simulation {
         self.model.forget(&mut self.particles.places, &self.solver);
         self.tools.forget_sides();
         self.wake();
-        self.publish();
+        self.publish(&Team::alone());
     }
 
     /// Particle positions [m].
@@ -397,7 +396,7 @@ impl Simulation {
 
         let places = &mut self.particles.places;
         let residual_rms = self.model.residual_rms(team, places, &self.solver);
-        self.publish();
+        self.publish(team);
         let chunks: Vec<&[[u32; 4]]> = self.sound_tets.chunks(TETS_PER_CHUNK).collect();
         let parts = team.map(chunks.len(), |chunk| {
             self.particles.volume_and_inverted(chunks[chunk])
@@ -409,7 +408,7 @@ impl Simulation {
         }
     }
 
-    /// Predict, constraints by colour, tools, velocities.
+    /// Predict, constraints part by part, tools, velocities.
     fn substep(&mut self, team: &Team, substep: u32) {
         let substep_s = self.solver.substep_s();
         let share = |k: u32| k as f32 / self.solver.substeps as f32;
@@ -441,21 +440,19 @@ impl Simulation {
     }
 
     /// Copies the state to where others read it, and brings the surface up to date.
-    fn publish(&mut self) {
+    fn publish(&mut self, team: &Team) {
         for (position, place) in self.positions.iter_mut().zip(&self.particles.places) {
             *position = place.truncate();
         }
         let (embedding, positions) = (&self.setup.embedding, &self.positions);
-        self.points
-            .par_iter_mut()
-            .enumerate()
-            .with_min_len(POINTS_PER_TASK)
-            .for_each(|(i, point)| {
+        team.for_runs(&mut self.points, POINTS_PER_CHUNK, |start, run| {
+            for (i, point) in (start..).zip(run) {
                 let (tet, weights) = (embedding.particles[i], embedding.weights[i]);
                 *point = (0..4)
                     .map(|k| weights[k] * positions[tet[k] as usize])
                     .sum();
-            });
+            }
+        });
         self.point_bounds = bounds(&self.points);
     }
 }
