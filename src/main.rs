@@ -47,6 +47,13 @@ enum Command {
     Replay(Replay),
     /// Charts speed against accuracy: prints a table, writes NAME.csv, NAME.json, NAME.svg and a report.
     Study(StudyArguments),
+    /// Compares the frame times of two replays: medians, ratio, and which stage changed.
+    Compare {
+        /// The folder that the first replay wrote.
+        a: PathBuf,
+        /// The folder that the second one wrote.
+        b: PathBuf,
+    },
     /// Reads scenes, meshes and pictures; says what they hold or what is wrong.
     Check {
         /// Files to read.
@@ -186,6 +193,7 @@ fn run(command: Option<Command>) -> Result<Outcome, AppError> {
             against: replay.against,
         }),
         Some(Command::Study(arguments)) => run_study(arguments),
+        Some(Command::Compare { a, b }) => app::compare(&a, &b),
         Some(Command::Check { files }) => app::check(&files),
         Some(Command::Scenes) => app::list_scenes(),
     }

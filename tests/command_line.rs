@@ -272,3 +272,36 @@ fn every_bundled_scene_is_listed_and_sound() {
         );
     }
 }
+
+#[test]
+fn two_runs_are_compared_stage_by_stage_and_a_folder_without_a_run_is_refused() {
+    let folder = Folder::new("compare");
+    replay(&folder, "a", &[]);
+    replay(&folder, "b", &["--set", "solver.substeps=60"]);
+    let (a, b) = (folder.path("a"), folder.path("b"));
+    let told = |b: &str| {
+        let output = palpate(&["compare", &a, b]);
+        assert!(output.status.success());
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let other = told(&b);
+    let line = other.lines().find(|line| line.starts_with("simulation"));
+    assert!(
+        line.is_some_and(|line| line.split_whitespace().count() >= 7),
+        "{other}"
+    );
+    assert!(other.contains("different states"), "{other}");
+    let itself = told(&a);
+    assert!(
+        itself.contains("same time in both; no stage differs"),
+        "{itself}"
+    );
+    assert!(itself.contains("same state"), "{itself}");
+    refused(
+        &["compare", &a, &folder.path("nowhere")],
+        &["summary.json", "check the path"],
+    );
+    folder.write("summary.json", b"{}");
+    let bare = folder.0.display().to_string();
+    refused(&["compare", &a, &bare], &["summary.json", "palpate replay"]);
+}

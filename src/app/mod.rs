@@ -27,6 +27,9 @@ pub use replay::{ReplayOptions, replay};
 pub use session::{Marker, Session, Tick};
 pub use window::{WindowOptions, window};
 
+use crate::measure::versus::{TimedRun, told};
+use std::path::Path;
+
 /// Version number.
 const VERSION_NUMBER: &str = env!("CARGO_PKG_VERSION");
 /// Commit that was built.
@@ -53,6 +56,21 @@ pub fn list_scenes() -> Result<Outcome, AppError> {
         let scene = load::scene(name, &[])?;
         println!("{name:<14} {}", scene.title);
     }
+    Ok(Outcome::Done)
+}
+
+/// Prints how long the stages of two runs took, one beside the other.
+///
+/// # Errors
+///
+/// [`AppError::File`] naming the file of a run that can't be read.
+pub fn compare(a: &Path, b: &Path) -> Result<Outcome, AppError> {
+    let runs = [TimedRun::read(a)?, TimedRun::read(b)?];
+    let names = [a, b].map(|folder| folder.display().to_string());
+    print!(
+        "{}",
+        told(names.each_ref().map(String::as_str), runs.each_ref())
+    );
     Ok(Outcome::Done)
 }
 

@@ -15,6 +15,7 @@ pub mod states;
 pub mod stats;
 pub mod summary;
 pub mod trace;
+pub mod versus;
 
 pub use files::{FileError, create_folder, write_png};
 pub use log::FrameRecord;
