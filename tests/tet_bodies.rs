@@ -314,3 +314,54 @@ fn damping_shrinks_velocities_once_a_frame_by_its_exponential() {
     let way = simulation.particles()[0].x - rest[0].x;
     assert!((way - 1.0 / 60.0).abs() < 1e-5, "{way}");
 }
+
+/// How far the tip of the bundled beam hangs after three seconds [m], and the session.
+fn settled(sets: &[&str]) -> (f32, Session) {
+    let mut session = session(BEAM, sets).expect("a sound scene");
+    for _ in 0..180 {
+        session.tick();
+    }
+    (marker(&session).1.length(), session)
+}
+
+#[test]
+fn stiff_tissue_is_given_the_substeps_that_it_needs_and_says_so() {
+    let stiff = "solver.youngs_modulus_pa=400000";
+    let (tip, given) = settled(&[stiff]);
+    let substeps = given.substeps();
+    assert!((21..=64).contains(&substeps), "{substeps}");
+    let note = format!("{substeps} are taken");
+    assert!(
+        given.notes.iter().any(|n| n.contains(&note)),
+        "{:?}",
+        given.notes
+    );
+    let (truth, _) = settled(&[stiff, "solver.method=\"implicit\"", "solver.substeps=1"]);
+    // Half a percent is what is asked of a settled tip; both are f32 solvers of the same equations.
+    assert!((tip / truth - 1.0).abs() < 5e-3, "{tip} m, not {truth}");
+}
+
+#[test]
+fn soft_tissue_keeps_its_substeps_and_what_would_need_very_many_does_too() {
+    let soft = session(BEAM, &[]).expect("a sound scene");
+    assert_eq!(soft.substeps(), soft.scene.solver.substeps);
+    assert!(soft.notes.iter().all(|note| !note.contains("taken")));
+    let hard = session(BEAM, &["solver.youngs_modulus_pa=1e7"]).expect("a sound scene");
+    assert_eq!(hard.substeps(), hard.scene.solver.substeps);
+    assert!(
+        hard.notes
+            .iter()
+            .any(|note| note.contains("method implicit"))
+    );
+}
+
+#[test]
+fn a_modulus_that_changes_while_it_runs_takes_and_gives_back_substeps() {
+    let mut session = session(BEAM, &[]).expect("a sound scene");
+    session.scene.solver.youngs_modulus_pa = 4e5;
+    session.set_solver();
+    assert!(session.substeps() > 20);
+    session.scene.solver.youngs_modulus_pa = 1e4;
+    session.set_solver();
+    assert_eq!(session.substeps(), 20);
+}

@@ -337,6 +337,7 @@ fn light_path_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAs
 fn solver_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAsk>) {
     ui.separator();
     ui.strong("Solver");
+    let taken = session.substeps();
     let solver = &mut session.scene.solver;
     let before = *solver;
     ComboBox::from_id_salt("solver")
@@ -353,6 +354,9 @@ fn solver_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAsk>) 
     );
     ui.add(Slider::new(&mut solver.poisson_ratio, 0.0..=0.49).text("Poisson ratio"));
     ui.add(Slider::new(&mut solver.substeps, 1..=60).text("substeps"));
+    if taken > solver.substeps {
+        ui.label(format!("{taken} are taken: the tissue is stiff"));
+    }
     ui.add(Slider::new(&mut solver.iterations, 1..=10).text("iterations"));
     if *solver != before {
         asks.push(PanelAsk::Solver);

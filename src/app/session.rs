@@ -7,7 +7,7 @@ use crate::geom::SurfaceMesh;
 use crate::geom::ray::nearest_point;
 use crate::passes::tools::DrawnTool;
 use crate::scene::{MarkerSection, RestBox, Scene};
-use crate::sim::{Method, Simulation, StepReport, ToolAction, ToolInput, ToolShape};
+use crate::sim::{Method, Simulation, SolverParams, StepReport, ToolAction, ToolInput, ToolShape};
 use glam::{DVec3, Vec3};
 use sha2::{Digest, Sha256};
 use std::time::Instant;
@@ -74,6 +74,7 @@ impl Session {
             .collect::<Result<_, _>>()?;
         let mut simulation = Simulation::new(setup, scene.solver);
         simulation.set_threads(Some(threads));
+        give_enough_substeps(&mut simulation);
         let mut notes = notes;
         notes.extend(solver_notes(&scene, &simulation));
         Ok(Self {
@@ -153,6 +154,12 @@ impl Session {
     /// Takes over changed solver knobs.
     pub fn set_solver(&mut self) {
         self.simulation.set_params(self.scene.solver);
+        give_enough_substeps(&mut self.simulation);
+    }
+
+    /// Substeps that are taken: those of the scene, or more if its tissue asks for them.
+    pub fn substeps(&self) -> u32 {
+        self.simulation.params().substeps
     }
 
     /// Time steps since the start.
@@ -199,6 +206,20 @@ impl Session {
     }
 }
 
+/// Substeps that a body may be given unasked. Beyond, `implicit` is faster on any mesh.
+const SUBSTEPS_GIVEN_MAX: u32 = 64;
+
+/// Raises the substeps to those with which the tissue is as stiff as it is said to be, if they are not many.
+fn give_enough_substeps(simulation: &mut Simulation) {
+    let enough = simulation.faithful_substeps();
+    if let Some(substeps) = enough.filter(|&substeps| substeps <= SUBSTEPS_GIVEN_MAX) {
+        simulation.set_params(SolverParams {
+            substeps,
+            ..simulation.params()
+        });
+    }
+}
+
 /// What a user should know before trusting the solver with this body.
 fn solver_notes(scene: &Scene, simulation: &Simulation) -> Vec<String> {
     let mut notes = Vec::new();
@@ -214,6 +235,14 @@ fn solver_notes(scene: &Scene, simulation: &Simulation) -> Vec<String> {
                 (scene.solver.timestep_s / stable_s).ceil()
             ));
         }
+    }
+    let (asked, taken) = (scene.solver.substeps, simulation.params().substeps);
+    if taken != asked {
+        notes.push(format!(
+            "tissue of {:.0} Pa is too stiff for {asked} substeps on this mesh: {taken} are taken; the \
+             method implicit may be faster",
+            scene.solver.youngs_modulus_pa
+        ));
     }
     if let Some(substeps) = simulation.faithful_substeps() {
         notes.push(format!(

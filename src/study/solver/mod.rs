@@ -121,6 +121,9 @@ impl Cell {
         let iterates = self.method != Method::MassSpring;
         let few = self.substeps * self.iterations <= SWEEPS_MAX;
         let small = self.iterations == 1 || (iterates && few && !self.is_large());
+        if self.method == Method::Implicit && self.is_large() {
+            return self.substeps <= 4 && self.iterations <= 2;
+        }
         let worth_the_time = self.substeps >= 10 || !self.is_large();
         small && worth_the_time
     }
