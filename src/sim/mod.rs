@@ -162,7 +162,8 @@ pub struct BodySetup {
     pub embedding: Embedding,
     /// Acceleration of every particle [m/s²].
     pub gravity_m_s2: Vec3,
-    /// Velocities are multiplied by exp(−damping · time step) once a step [1/s].
+    /// Velocities fall by exp(−damping · time step) in a step: at its end, or in its substeps by the implicit
+    /// method [1/s].
     pub damping_per_s: f32,
 }
 

@@ -89,13 +89,6 @@ impl Model {
         }
     }
 
-    /// Has velocities damped by a factor, if the model has any but the particles' own.
-    pub fn damp(&mut self, factor: f32) {
-        if let Self::Implicit(model) = self {
-            model.damp(factor);
-        }
-    }
-
     /// One sweep over all constraints.
     pub fn project(&mut self, team: &Team, particles: &mut [Vec4], params: &SolverParams) {
         let (lame, substep_s) = (params.lame(), params.substep_s());

@@ -377,16 +377,19 @@ impl Simulation {
         for substep in 0..self.solver.substeps {
             self.substep(team, substep);
         }
-        // A wrecked body's speed comes from the wreck; it would overshoot its shape.
-        let damping = if self.model.is_restoring() {
-            0.0
-        } else {
-            (-self.setup.damping_per_s * self.solver.timestep_s).exp()
-        };
-        for velocity in &mut self.particles.velocities {
-            *velocity *= damping;
+        // Where a step is one solve after another, damping is one of its forces: struck off once a
+        // step, a wave that turns as a step ends would keep all of its speed.
+        if !matches!(self.model, Model::Implicit(_)) {
+            // A wrecked body's speed comes from the wreck; it would overshoot its shape.
+            let damping = if self.model.is_restoring() {
+                0.0
+            } else {
+                (-self.setup.damping_per_s * self.solver.timestep_s).exp()
+            };
+            for velocity in &mut self.particles.velocities {
+                *velocity *= damping;
+            }
         }
-        self.model.damp(damping);
         let frozen = self.particles.freeze_if_not_finite();
         self.frozen += frozen;
         if frozen > 0 && matches!(self.model, Model::Implicit(_)) {
@@ -416,6 +419,7 @@ impl Simulation {
         if let Model::Implicit(model) = &mut self.model {
             let step = Step {
                 gravity_m_s2: self.setup.gravity_m_s2,
+                damping_per_s: self.setup.damping_per_s,
                 lame: self.solver.lame(),
                 substep_s,
                 iterations: self.solver.iterations,

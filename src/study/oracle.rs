@@ -1,6 +1,7 @@
 //! Where a body comes to rest and how it swings, solved at length in f64 and kept on disk.
 
 use super::held_body::HeldBody;
+use super::random::Random;
 use crate::app::AppError;
 use crate::measure::files;
 use crate::reference::{Fem, FemSetup, Material, NoEquilibrium, Swing};
@@ -93,6 +94,24 @@ impl Oracle {
 /// [`NoEquilibrium`] if Newton's method finds none.
 pub fn settled_m(body: &HeldBody, tissue: Tissue) -> Result<Vec<DVec3>, NoEquilibrium> {
     Ok(fem(body, tissue).statics()?.positions)
+}
+
+/// Elastic energy of `body` at rest with each free coordinate off by up to half its last digit in f32, as
+/// it is once rounded [J].
+pub fn rounding_j(body: &HeldBody, tissue: Tissue) -> f64 {
+    let mut random = Random::new(1);
+    let mut off = |x: f32| {
+        let digit = f64::from(x.abs().next_up()) - f64::from(x.abs());
+        f64::from(x) + digit * f64::from(random.between(-0.5, 0.5))
+    };
+    let mut places: Vec<DVec3> = Vec::new();
+    for (x, fixed) in body.setup.tets.particles.iter().zip(&body.setup.fixed) {
+        places.push(match fixed {
+            true => x.as_dvec3(),
+            false => DVec3::new(off(x.x), off(x.y), off(x.z)),
+        });
+    }
+    fem(body, tissue).elastic_energy_j(&places)
 }
 
 fn fem(body: &HeldBody, tissue: Tissue) -> Fem {

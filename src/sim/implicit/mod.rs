@@ -62,6 +62,8 @@ const SMOOTH_WEIGHTS: f64 = 2.0;
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     pub gravity_m_s2: Vec3,
+    /// Force against velocity, over mass [1/s].
+    pub damping_per_s: f32,
     pub lame: Lame,
     /// Length [s].
     pub substep_s: f32,
@@ -161,14 +163,6 @@ impl Implicit {
         self.past_substep_s = None;
     }
 
-    /// Has all velocities damped by a factor, those of the past as well; the particles' own are
-    /// the caller's.
-    pub fn damp(&mut self, factor: f32) {
-        for velocity in &mut self.velocities_before {
-            *velocity *= f64::from(factor);
-        }
-    }
-
     /// Starts a time step.
     pub fn begin_step(&mut self) {
         self.newton.begin_step();
@@ -181,7 +175,12 @@ impl Implicit {
         let h = f64::from(step.substep_s);
         let tau = IMPLICIT_SHARE * h;
         let gravity = step.gravity_m_s2.as_dvec3().extend(0.0);
-        let inertia = self.masses_kg.iter().map(|&mass| mass / (tau * tau));
+        // v = carried + tau (force / mass - damping v), so damping adds to inertia.
+        let damped = 1.0 + f64::from(step.damping_per_s) * tau;
+        let inertia = self
+            .masses_kg
+            .iter()
+            .map(|&mass| mass * damped / (tau * tau));
         self.goal.inertia.clear();
         self.goal.inertia.extend(inertia);
         self.goal.grip.clear();
@@ -201,7 +200,8 @@ impl Implicit {
                 continue;
             }
             let carried = (4.0 * velocity - velocity_before) / 3.0;
-            self.goal.free[node] = (4.0 * now - before) / 3.0 + tau * (carried + tau * gravity);
+            self.goal.free[node] =
+                (4.0 * now - before) / 3.0 + tau / damped * (carried + tau * gravity);
             self.next[node] = now + h * velocity;
         }
         let end = if tools.are_busy() {
@@ -297,14 +297,15 @@ impl Implicit {
     fn take_blows(&mut self, step: Step) {
         let h = f64::from(step.substep_s);
         let gravity = step.gravity_m_s2.as_dvec3().extend(0.0);
+        let damped = 1.0 + f64::from(step.damping_per_s) * h;
         for hold in self.goal.grip.touches() {
             for &(node, _) in &hold.place.carriers {
                 let node = node as usize;
                 let is_free = node < self.order.free && self.velocities_before[node].is_finite();
                 if is_free && !std::mem::replace(&mut self.touched[node], true) {
-                    self.goal.inertia[node] = self.masses_kg[node] / (h * h);
+                    self.goal.inertia[node] = self.masses_kg[node] * damped / (h * h);
                     self.goal.free[node] =
-                        self.now[node] + h * (self.velocities_before[node] + h * gravity);
+                        self.now[node] + h / damped * (self.velocities_before[node] + h * gravity);
                 }
             }
         }
@@ -400,7 +401,7 @@ impl Implicit {
             let particle = self.order.particle[node] as usize;
             let velocity = particles.velocities[particle].as_dvec3().extend(0.0);
             let acceleration = if is_smooth {
-                force(node, mass) / mass
+                force(node, mass) / mass - f64::from(step.damping_per_s) * velocity
             } else {
                 DVec4::ZERO
             };

@@ -92,8 +92,13 @@ pub fn judge(m: &Measures) -> (Verdict, Option<Fault>) {
         });
         fail(Fault::Explodes, format!("explodes: a particle {sizes}"));
     }
-    if let Some(tets @ 1..) = m.inverted_tets {
-        fail(Fault::Inverted, format!("{tets} tetrahedra still inverted"));
+    let in_truth = m.inverted_tets_oracle.unwrap_or(0);
+    if let Some(tets) = m.inverted_tets.filter(|&tets| tets > in_truth) {
+        let why = match in_truth {
+            0 => format!("{tets} tetrahedra still inverted"),
+            some => format!("{tets} tetrahedra still inverted, {some} in truth"),
+        };
+        fail(Fault::Inverted, why);
     }
     if m.tunnelled == Some(true) {
         fail(Fault::Tunnelled, "tunnelled: the tool is inside".to_owned());
@@ -277,6 +282,18 @@ mod tests {
             "{}",
             verdict.why
         );
+    }
+
+    #[test]
+    fn folds_that_the_truth_has_too_are_no_fault() {
+        let folded = |inverted_tets, inverted_tets_oracle| Measures {
+            inverted_tets,
+            inverted_tets_oracle,
+            ..calm()
+        };
+        assert_eq!(judge(&folded(Some(5), Some(5))).1, None);
+        assert_eq!(judge(&folded(Some(6), Some(5))).1, Some(Fault::Inverted));
+        assert_eq!(judge(&folded(Some(1), None)).1, Some(Fault::Inverted));
     }
 
     #[test]

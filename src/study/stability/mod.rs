@@ -17,8 +17,9 @@ use super::oracle::{self, Tissue};
 use super::sweep::{Row, Sweep};
 use crate::app::AppError;
 use crate::geom::TetMesh;
+use crate::sim::diagnose::volume_and_inverted;
 use crate::sim::{Method, SolverParams};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::path::Path;
@@ -199,8 +200,19 @@ impl Cell {
     }
 }
 
-/// A static oracle: positions [m], or why there are none.
-type Equilibrium = Result<Vec<DVec3>, String>;
+/// What a hanging body is judged by.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Statics {
+    /// Where its particles come to rest [m].
+    pub settled_m: Vec<DVec3>,
+    /// Tetrahedra that are inverted there: tissue too soft for its weight folds, in truth as well.
+    pub inverted_tets: usize,
+    /// What the rounding of its particles' places to f32 looks like as elastic energy [J].
+    pub rounding_j: f64,
+}
+
+/// The static oracle, or why there is none.
+type Equilibrium = Result<Statics, String>;
 
 /// The study with what its cells share.
 pub struct Stability {
@@ -295,7 +307,7 @@ impl Sweep for Stability {
                 trial::hang(
                     cell,
                     hanging,
-                    equilibrium.get().and_then(|e| e.as_deref().ok()),
+                    equilibrium.get().and_then(|e| e.as_ref().ok()),
                 )
             }
             Kind::Wreck => trial::wreck(cell, hanging),
@@ -327,7 +339,14 @@ impl Stability {
                 youngs_modulus_pa: cell.youngs_modulus_pa,
                 poisson_ratio: cell.poisson_ratio,
             };
-            oracle::settled_m(&self.hanging[&cell.mesh], tissue).map_err(|error| error.to_string())
+            let body = &self.hanging[&cell.mesh];
+            let settled_m = oracle::settled_m(body, tissue).map_err(|error| error.to_string())?;
+            let rounded: Vec<Vec3> = settled_m.iter().map(|x| x.as_vec3()).collect();
+            Ok(Statics {
+                inverted_tets: volume_and_inverted(&rounded, &body.setup.tets.tets).1,
+                rounding_j: oracle::rounding_j(body, tissue),
+                settled_m,
+            })
         });
         place
     }
@@ -337,18 +356,7 @@ impl Stability {
 fn cells(plan: &Plan) -> Vec<Cell> {
     let (body, solver) = (&plan.body, &plan.solver);
     let default = SolverParams::default();
-    let base = Cell {
-        method: default.method,
-        mesh: or_first(&body.mesh, Mesh::Regular),
-        youngs_modulus_pa: or_first(&solver.youngs_modulus_pa, 1e4),
-        poisson_ratio: or_first(&solver.poisson_ratio, 0.45),
-        timestep_s: or_first(&solver.timestep_s, 1.0 / 60.0),
-        substeps: or_first(&solver.substeps, default.substeps),
-        iterations: 1,
-        poke_speed_m_s: or_first(&plan.tool.speed_m_s, 0.0),
-        start: or_first(&body.start, Start::Rest),
-        seed: 0,
-    };
+    let base = base(plan);
     let mut cells = vec![base.clone()];
     over(&mut cells, &solver.method, |cell, value| {
         cell.method = value
@@ -384,6 +392,24 @@ fn cells(plan: &Plan) -> Vec<Cell> {
             })
         })
         .collect()
+}
+
+/// The setting that others depart from.
+fn base(plan: &Plan) -> Cell {
+    let (body, solver) = (&plan.body, &plan.solver);
+    let default = SolverParams::default();
+    Cell {
+        method: default.method,
+        mesh: or_first(&body.mesh, Mesh::Regular),
+        youngs_modulus_pa: or_first(&solver.youngs_modulus_pa, 1e4),
+        poisson_ratio: or_first(&solver.poisson_ratio, 0.45),
+        timestep_s: or_first(&solver.timestep_s, 1.0 / 60.0),
+        substeps: or_first(&solver.substeps, default.substeps),
+        iterations: 1,
+        poke_speed_m_s: or_first(&plan.tool.speed_m_s, 0.0),
+        start: or_first(&body.start, Start::Rest),
+        seed: 0,
+    }
 }
 
 /// Puts in place of each cell one for each of `values`.

@@ -1,9 +1,9 @@
 //! Maps, envelope and tables of the study, from its rows alone.
 
 use super::super::findings::Findings;
-use super::super::sweep::{Row, State};
+use super::super::sweep::{Row, State, Sweep};
 use super::fault::Fault;
-use super::{Cell, Kind, Measures, Mesh, Start};
+use super::{Cell, Kind, Measures, Mesh, Stability, Start, base, departures};
 use crate::measure::chart::{number, three_digits};
 use crate::measure::map::{MapChart, Panel, Tile};
 use crate::measure::page::{Block, Table};
@@ -28,8 +28,8 @@ pub fn findings(rows: &[StabilityRow]) -> Findings {
     let mut blocks = vec![Block::Paragraph(lead(rows))];
     blocks.extend(maps.iter().map(|map| Block::Chart {
         svg: map.svg(),
-        caption: "Each tile is the worst of the cells at its two values. Nothing was measured where there \
-                  is none."
+        caption: "Each tile is the worst of the cells at its two values; pokes and wrecks with nothing else \
+                  changed. Nothing was measured where there is no tile."
             .to_owned(),
     }));
     blocks.push(Block::Paragraph(
@@ -153,6 +153,21 @@ fn of_kind(rows: &[StabilityRow], kind: Kind) -> Vec<&StabilityRow> {
     rows.iter().filter(|row| row.cell.kind() == kind).collect()
 }
 
+/// Rows of a kind in which only what `reset` sets back is not as in the base setting.
+fn nothing_else_changed(
+    rows: &[StabilityRow],
+    kind: Kind,
+    reset: impl Fn(&mut Cell, &Cell),
+) -> Vec<&StabilityRow> {
+    let base = base(&Stability::plan(false));
+    let is_plain = |row: &&StabilityRow| {
+        let mut cell = row.cell.clone();
+        reset(&mut cell, &base);
+        departures(&cell, &base) == 0
+    };
+    of_kind(rows, kind).into_iter().filter(is_plain).collect()
+}
+
 fn moduli(rows: &[&StabilityRow]) -> Vec<f64> {
     ascending(rows.iter().map(|row| row.cell.youngs_modulus_pa))
 }
@@ -194,9 +209,12 @@ fn map_of_moduli_and_substeps(rows: &[StabilityRow]) -> Option<MapChart> {
     })
 }
 
-/// Poke speed against mesh and against modulus.
+/// Modulus against poke speed.
 fn map_of_pokes(rows: &[StabilityRow]) -> Option<MapChart> {
-    let poked = of_kind(rows, Kind::Poke);
+    let poked = nothing_else_changed(rows, Kind::Poke, |cell, base| {
+        cell.poke_speed_m_s = base.poke_speed_m_s;
+        cell.youngs_modulus_pa = base.youngs_modulus_pa;
+    });
     let speeds = ascending(poked.iter().map(|row| row.cell.poke_speed_m_s));
     let moduli = moduli(&poked);
     let panels = |method: Method| {
@@ -222,7 +240,10 @@ fn map_of_pokes(rows: &[StabilityRow]) -> Option<MapChart> {
 
 /// Start against mesh.
 fn map_of_starts(rows: &[StabilityRow]) -> Option<MapChart> {
-    let wrecked = of_kind(rows, Kind::Wreck);
+    let wrecked = nothing_else_changed(rows, Kind::Wreck, |cell, base| {
+        cell.mesh = base.mesh;
+        cell.start = base.start;
+    });
     let meshes = meshes(rows);
     let mut starts: Vec<Start> = distinct(wrecked.iter().map(|row| row.cell.start));
     starts.sort_unstable();
@@ -363,10 +384,12 @@ fn stiffness(rows: &[StabilityRow]) -> Table {
 
 /// Frames to recover for each method and start, with nothing else changed.
 fn recovery(rows: &[StabilityRow]) -> Table {
-    let wrecked = of_kind(rows, Kind::Wreck);
+    let wrecked = nothing_else_changed(rows, Kind::Wreck, |cell, base| {
+        cell.mesh = base.mesh;
+        cell.start = base.start;
+    });
     let mut starts: Vec<Start> = distinct(wrecked.iter().map(|row| row.cell.start));
     starts.sort_unstable();
-    let default = SolverParams::default();
     let mut lines = Vec::new();
     for method in methods(rows) {
         for mesh in meshes(rows) {
@@ -376,10 +399,6 @@ fn recovery(rows: &[StabilityRow]) -> Table {
                     .filter(|row| {
                         let cell = &row.cell;
                         (cell.method, cell.mesh, cell.start) == (method, mesh, start)
-                            && cell.substeps == default.substeps
-                            && cell.youngs_modulus_pa == 1e4
-                            && cell.poisson_ratio == 0.45
-                            && cell.timestep_s == 1.0 / 60.0
                     })
                     .map(|row| row.measures.frames_to_recover)
                     .collect();

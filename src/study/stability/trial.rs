@@ -5,7 +5,7 @@ use super::super::random::Random;
 use super::super::sweep::{Cost, Row, finite};
 use super::super::timing::{Clock, Times};
 use super::fault::{BACK_RMS, Fault, judge};
-use super::{Cell, Start};
+use super::{Cell, Start, Statics};
 use crate::geom::bounds;
 use crate::sim::diagnose::{energy, volume_and_inverted};
 use crate::sim::{Simulation, ToolAction, ToolInput, ToolShape};
@@ -30,6 +30,9 @@ const TOOL_DEPTH_SHARE: f32 = 0.3;
 /// Time the tool stays there, and time after it has left [s].
 const HOLD_S: f64 = 0.33;
 const AFTER_S: f64 = 1.0;
+/// Energy is that of places rounded to f32; their rounding looks like so much, in the mean of it over
+/// many tetrahedra, that the highest of a hundred frames stays below.
+const ROUNDINGS: f64 = 2.0;
 /// Friction of the tool.
 const FRICTION: f32 = 0.3;
 
@@ -51,12 +54,15 @@ pub struct Measures {
     pub farthest_sizes: Option<f64>,
     /// Way without any force, in body sizes.
     pub drift_sizes: Option<f64>,
-    /// Energy gained in undamped release, over the work of gravity down to the static sag.
+    /// Energy gained in undamped release beyond what rounding looks like, over the work of gravity
+    /// down to the static sag.
     pub energy_growth_rel: Option<f64>,
     /// Sag of the tip over the static one.
     pub sag_ratio: Option<f64>,
     /// At the end.
     pub inverted_tets: Option<usize>,
+    /// In the static solution: so many fold in truth as well.
+    pub inverted_tets_oracle: Option<usize>,
     pub speed_left_m_s: Option<f64>,
     /// Volume off that of the static solution, or that at rest, at the end; as a share.
     pub volume_error_rel: Option<f64>,
@@ -168,8 +174,8 @@ impl<'a> Watched<'a> {
     }
 }
 
-/// Rest, undamped release, damped settling. `equilibrium` is the static solution [m].
-pub fn hang(cell: &Cell, body: &HeldBody, equilibrium: Option<&[DVec3]>) -> Row<Cell, Measures> {
+/// Rest, undamped release, damped settling.
+pub fn hang(cell: &Cell, body: &HeldBody, statics: Option<&Statics>) -> Row<Cell, Measures> {
     let mut resting = Watched::new(cell, body, Vec3::ZERO, 0.0);
     resting.steps(cell.frames(REST_S));
     let mut hanging = Watched::new(cell, body, GRAVITY_M_S2, 0.0);
@@ -185,12 +191,15 @@ pub fn hang(cell: &Cell, body: &HeldBody, equilibrium: Option<&[DVec3]>) -> Row<
     let mut measures = hanging.measures(cell, "Newton statics");
     measures.not_finite_frame = resting.not_finite_frame.or(measures.not_finite_frame);
     measures.drift_sizes = finite(resting.farthest_m / body.size_m);
-    if let Some(equilibrium) = equilibrium {
-        let work_j = work_of_gravity_j(body, equilibrium);
-        measures.energy_growth_rel = finite((highest_j - start_j) / work_j);
-        let sag_m = body.tip_of_oracle_m(equilibrium).z;
+    if let Some(statics) = statics {
+        let settled_m = &statics.settled_m;
+        let work_j = work_of_gravity_j(body, settled_m);
+        let gained_j = (highest_j - start_j - ROUNDINGS * statics.rounding_j).max(0.0);
+        measures.energy_growth_rel = finite(gained_j / work_j);
+        measures.inverted_tets_oracle = Some(statics.inverted_tets);
+        let sag_m = body.tip_of_oracle_m(settled_m).z;
         measures.sag_ratio = finite(body.tip_m(positions).z / sag_m);
-        let still: Vec<Vec3> = equilibrium.iter().map(|x| x.as_vec3()).collect();
+        let still: Vec<Vec3> = settled_m.iter().map(|x| x.as_vec3()).collect();
         measures.volume_error_rel = volume_error(body, positions, &still);
     } else {
         measures.oracle = "no static solution".to_owned();
@@ -239,6 +248,7 @@ pub fn wreck(cell: &Cell, body: &HeldBody) -> Row<Cell, Measures> {
         }
     }
     let mut measures = watched.measures(cell, "its own settled state");
+    measures.inverted_tets_oracle = is_usable.then_some(inverted);
     measures.frames_to_recover = back_since;
     measures.rms_left_sizes = Some(if rms.is_finite() { rms } else { f64::MAX });
     // A particle pulled away by ten lengths was not thrown there by the method.
@@ -383,15 +393,20 @@ mod tests {
             youngs_modulus_pa: 1e4,
             poisson_ratio: 0.45,
         };
-        let truth = crate::study::oracle::settled_m(&body, tissue).expect("it comes to rest");
-        let row = hang(&cell(), &body, Some(&truth));
+        let settled_m = crate::study::oracle::settled_m(&body, tissue).expect("it comes to rest");
+        let statics = |settled_m: &[DVec3]| Statics {
+            settled_m: settled_m.to_vec(),
+            inverted_tets: 0,
+            rounding_j: 0.0,
+        };
+        let row = hang(&cell(), &body, Some(&statics(&settled_m)));
         let sag = row.measures.sag_ratio.expect("it sags");
         // Ten substeps on a coarse mesh are within some percent; half the truth is seen at once.
         assert!((0.9..1.1).contains(&sag), "{sag}");
-        let half: Vec<DVec3> = (truth.iter().zip(&body.setup.tets.particles))
+        let half: Vec<DVec3> = (settled_m.iter().zip(&body.setup.tets.particles))
             .map(|(x, rest)| (*x + rest.as_dvec3()) / 2.0)
             .collect();
-        let row = hang(&cell(), &body, Some(&half));
+        let row = hang(&cell(), &body, Some(&statics(&half)));
         assert!(row.measures.sag_ratio.expect("it sags") > 1.8);
         assert_eq!(
             row.measures.fault,
