@@ -175,6 +175,11 @@ impl Implicit {
         let h = f64::from(step.substep_s);
         let tau = IMPLICIT_SHARE * h;
         let gravity = step.gravity_m_s2.as_dvec3().extend(0.0);
+        self.goal.grip.clear();
+        self.touched.fill(false);
+        if self.past_substep_s != Some(step.substep_s) {
+            self.make_up_past(particles, step);
+        }
         // v = carried + tau (force / mass - damping v), so damping adds to inertia.
         let damped = 1.0 + f64::from(step.damping_per_s) * tau;
         let inertia = self
@@ -183,11 +188,6 @@ impl Implicit {
             .map(|&mass| mass * damped / (tau * tau));
         self.goal.inertia.clear();
         self.goal.inertia.extend(inertia);
-        self.goal.grip.clear();
-        self.touched.fill(false);
-        if self.past_substep_s != Some(step.substep_s) {
-            self.make_up_past(particles, step);
-        }
         for (node, &particle) in self.order.particle[..self.order.free].iter().enumerate() {
             let velocity = particles.velocities[particle as usize]
                 .as_dvec3()
@@ -382,28 +382,45 @@ impl Implicit {
         self.forget();
     }
 
-    /// Makes up a past of constant acceleration: the one that the forces give, or none where they
-    /// are those of no smooth motion.
+    /// Makes up a past of constant acceleration: the one that a step of the backward Euler formula finds, or
+    /// none where the forces are those of no smooth motion. The forces alone would do for slow waves; a stiff
+    /// body let go would be told a past in which it fell freely, and take that fall's speed over.
     fn make_up_past(&mut self, particles: &Particles, step: Step) {
         let h = f64::from(step.substep_s);
         let gravity = step.gravity_m_s2.as_dvec3().extend(0.0);
-        // Without inertia the residual is the elastic force.
+        let velocity = |particle: u32| {
+            let velocity = particles.velocities[particle as usize];
+            velocity.as_dvec3().extend(0.0)
+        };
+        // Where the goal is where the body is, the residual is the elastic force.
+        self.goal.inertia.resize(self.masses_kg.len(), 0.0);
         self.goal.free.copy_from_slice(&self.now[..self.order.free]);
         self.newton.evaluate(&self.now, &self.goal, step.lame);
-        let force = |node: usize, mass: f64| self.newton.residual[node].as_dvec4() + mass * gravity;
         let (mut force_n2, mut weight_n2) = (0.0, 0.0);
         for (node, &mass) in self.masses_kg.iter().enumerate() {
-            force_n2 += force(node, mass).length_squared();
+            let force = self.newton.residual[node].as_dvec4() + mass * gravity;
+            force_n2 += force.length_squared();
             weight_n2 += (mass * gravity).length_squared();
         }
-        let is_smooth = force_n2 <= SMOOTH_WEIGHTS.powi(2) * weight_n2;
-        for (node, &mass) in self.masses_kg.iter().enumerate() {
-            let particle = self.order.particle[node] as usize;
-            let velocity = particles.velocities[particle].as_dvec3().extend(0.0);
-            let acceleration = if is_smooth {
-                force(node, mass) / mass - f64::from(step.damping_per_s) * velocity
-            } else {
-                DVec4::ZERO
+        let is_finite = (particles.velocities.iter()).all(|velocity| velocity.is_finite());
+        let is_smooth = is_finite && force_n2 <= SMOOTH_WEIGHTS.powi(2) * weight_n2;
+        if is_smooth {
+            self.goal.load_n = (force_n2 + weight_n2).sqrt();
+            let damped = 1.0 + f64::from(step.damping_per_s) * h;
+            self.next.copy_from_slice(&self.now);
+            for (node, &mass) in self.masses_kg.iter().enumerate() {
+                let velocity = velocity(self.order.particle[node]);
+                self.goal.inertia[node] = mass * damped / (h * h);
+                self.goal.free[node] = self.now[node] + h / damped * (velocity + h * gravity);
+            }
+            let start = self.newton.evaluate(&self.next, &self.goal, step.lame);
+            self.descend(start, step);
+        }
+        for node in 0..self.order.free {
+            let velocity = velocity(self.order.particle[node]);
+            let acceleration = match is_smooth {
+                true => (self.next[node] - self.now[node] - h * velocity) / (h * h),
+                false => DVec4::ZERO,
             };
             self.before[node] = self.now[node] - h * (velocity - 0.5 * h * acceleration);
             self.velocities_before[node] = velocity - h * acceleration;

@@ -40,7 +40,7 @@ pub fn findings(rows: &[StabilityRow]) -> Findings {
     ));
     blocks.push(Block::Table(envelope(rows)));
     blocks.push(Block::Paragraph(
-        "The same as one number: h² E / (ρ dx²), with h the substep and dx the edge of a mean tetrahedron, \
+        "The same as one number: h² (λ+2μ) / (ρ dx²), with h the substep and dx the edge of a mean tetrahedron, \
          below which no hanging or standing body failed."
             .to_owned(),
     ));
@@ -350,7 +350,7 @@ fn largest_safe_modulus(rows: &[&StabilityRow]) -> Option<(f64, usize)> {
         .map(|modulus| (modulus, safe().count()))
 }
 
-/// h² E / (ρ dx²) below which no hanging body failed.
+/// h² (λ+2μ) / (ρ dx²) below which no hanging body failed.
 fn stiffness(rows: &[StabilityRow]) -> Table {
     let lines = methods(rows).into_iter().map(|method| {
         let mut hanging: Vec<&StabilityRow> = of_kind(rows, Kind::Hang)
