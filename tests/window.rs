@@ -105,6 +105,26 @@ impl Desk {
     }
 }
 
+impl Desk {
+    /// A push that is recorded, and the scene file it ends in.
+    fn recorded_push(&self) -> PathBuf {
+        self.tool(&["key", "o"]);
+        sleep(Duration::from_millis(500));
+        self.tool(&["mousedown", "1"]);
+        for step in 0..6 {
+            let y = (350 + 4 * step).to_string();
+            self.tool(&["mousemove", "440", &y]);
+            sleep(Duration::from_millis(150));
+        }
+        self.tool(&["mouseup", "1"]);
+        sleep(Duration::from_millis(300));
+        self.tool(&["key", "o"]);
+        let path = self.folder.join("palpate-001.toml");
+        self.wait_for("a recording", || path.exists());
+        path
+    }
+}
+
 impl Drop for Desk {
     fn drop(&mut self) {
         let _ = std::fs::remove_dir_all(&self.folder);
@@ -176,6 +196,7 @@ fn a_mouse_push_moves_the_organ_is_answered_by_a_force_and_changes_the_picture()
     }
     let pushed = desk.picture(3);
     desk.tool(&["mouseup", "1"]);
+    let recorded = desk.recorded_push();
     desk.tool(&["key", "ctrl+q"]);
     desk.wait_for("the window to close", || {
         window.0.try_wait().expect("the window's state").is_some()
@@ -195,4 +216,30 @@ fn a_mouse_push_moves_the_organ_is_answered_by_a_force_and_changes_the_picture()
         change > 0.002 && change > 10.0 * noise,
         "a push changed {change} of the pixels, standing still {noise}"
     );
+    assert_replays(&recorded);
+}
+
+/// A recording says in which state it ends, and its replay ends there.
+fn assert_replays(recorded: &Path) {
+    let folder = recorded.parent().expect("it is in a folder");
+    let replay = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args(["replay", "--no-render", "--out", "replayed"])
+        .arg(recorded)
+        .current_dir(folder)
+        .output()
+        .expect("the binary runs");
+    let told = String::from_utf8_lossy(&replay.stderr).into_owned();
+    assert!(replay.status.success(), "{told}");
+    let summary = std::fs::read_to_string(folder.join("replayed/summary.json"));
+    let summary: serde_json::Value =
+        serde_json::from_str(&summary.expect("the replay has a summary")).expect("sound JSON");
+    let state = summary["state_sha256"].as_str().expect("a hash");
+    let text = std::fs::read_to_string(recorded).expect("the recording is there");
+    assert!(
+        text.contains(state),
+        "{state} is not that of {}",
+        &text[..200]
+    );
+    let force_n = summary["tool"]["force_max_n"].as_f64();
+    assert!(force_n.is_some_and(|force| force > 0.01), "{force_n:?}");
 }

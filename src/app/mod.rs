@@ -15,6 +15,7 @@ mod renderer;
 mod replay;
 mod script;
 mod session;
+mod take;
 mod window;
 
 pub use assets::DEFAULT_SCENE;

@@ -12,6 +12,9 @@ use crate::sim::Method;
 use egui::{Align2, Color32, ComboBox, RichText, Slider, Ui};
 use egui_plot::{Bar, BarChart, Line, Plot, PlotPoints};
 
+/// Of what says that the mouse is recorded.
+const RECORDING: Color32 = Color32::from_rgb(232, 84, 72);
+
 /// What the panel shows and what was switched in it.
 pub struct PanelState {
     /// Scene that runs.
@@ -22,6 +25,8 @@ pub struct PanelState {
     pub paused: bool,
     /// One time step is wanted though time stands still.
     pub step_once: bool,
+    /// The mouse is recorded.
+    pub records: bool,
     /// A picture is to be saved.
     pub screenshot: bool,
     /// Whether the panel is shown.
@@ -53,6 +58,10 @@ pub enum PanelAsk {
     Solver,
     /// Back to rest.
     Reset,
+    /// Start a recording of the mouse, or end and save it.
+    Record,
+    /// Save the scene with its knobs as they are.
+    SaveScene,
     /// Play the scene's script from its start.
     PlayScript,
     /// Back to the scene's camera.
@@ -67,6 +76,7 @@ impl PanelState {
             hand,
             paused: false,
             step_once: false,
+            records: false,
             screenshot: false,
             panel_open: true,
             help_open: false,
@@ -167,6 +177,24 @@ fn run_section(
         }
         if ui.button("Camera").clicked() {
             asks.push(PanelAsk::ResetCamera);
+        }
+    });
+    ui.horizontal(|ui| {
+        let label = if state.records {
+            RichText::new("Stop and save").color(RECORDING)
+        } else {
+            RichText::new("Record")
+        };
+        let record = ui.button(label);
+        let about = "Starts from rest and saves what the mouse does as a scene that replays it";
+        if record.on_hover_text(about).clicked() {
+            asks.push(PanelAsk::Record);
+        }
+        if ui.button("Save scene").clicked() {
+            asks.push(PanelAsk::SaveScene);
+        }
+        if ui.button("Picture").clicked() {
+            state.screenshot = true;
         }
     });
 }
@@ -410,6 +438,8 @@ fn help(ui: &Ui, state: &mut PanelState) {
                     ("P", "play the scene's script"),
                     ("C", "back to the scene's camera"),
                     ("S or F12", "save a picture"),
+                    ("O", "record the mouse from rest; again: stop and save"),
+                    ("K", "save the scene as it is"),
                     ("Tab", "hide or show the panel"),
                     ("H or F1", "this list"),
                     ("Escape or Ctrl+Q", "close the window"),

@@ -96,7 +96,8 @@ impl ScriptedTool {
         let after = self.keys.partition_point(|key| key.at_s <= time_s);
         let key = self.keys[after.saturating_sub(1)];
         let position_m = match self.keys.get(after) {
-            Some(next) if after > 0 => {
+            // A tool that rests is where it is, to the last bit.
+            Some(next) if after > 0 && next.position_m != key.position_m => {
                 let share = (time_s - key.at_s) / (next.at_s - key.at_s);
                 key.position_m.lerp(next.position_m, share)
             }

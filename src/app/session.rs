@@ -149,6 +149,8 @@ impl Session {
     pub fn reset(&mut self) {
         self.frame = 0;
         self.simulation.reset();
+        // What a run has shown of its body may have changed how many substeps it is given.
+        self.set_solver();
     }
 
     /// Takes over changed solver knobs.
@@ -170,6 +172,11 @@ impl Session {
     /// Simulated time [s].
     pub fn time_s(&self) -> f32 {
         self.frame as f32 * self.scene.solver.timestep_s
+    }
+
+    /// Simulated time a step ago [s].
+    pub fn time_before_s(&self) -> f32 {
+        self.frame.saturating_sub(1) as f32 * self.scene.solver.timestep_s
     }
 
     /// Where the surface points are [m].

@@ -8,13 +8,16 @@ use super::panel::{self, PanelAsk, PanelState};
 use super::record::Recording;
 use super::renderer::Renderer;
 use super::replay::{ReplayOptions, replay};
+use super::take::Take;
 use super::{AppError, Outcome, Session, thread_count};
 use crate::gpu::{Gpu, GpuError};
+use crate::measure::files::write;
 use crate::measure::write_png;
+use crate::scene::Scene;
 use crate::sim::ToolAction;
 use egui_wgpu::ScreenDescriptor;
 use glam::Vec2;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use winit::application::ApplicationHandler;
@@ -132,13 +135,14 @@ struct Shown {
     history: History,
     /// Every frame since the window opened, for the log.
     recording: Recording,
+    /// What the hand does, while it is recorded.
+    take: Option<Take>,
     threads: usize,
     /// Where the scene is drawn [physical px]: left, top, width, height.
     view_px: [u32; 4],
     cursor_px: Vec2,
     last_frame: Instant,
     owed_s: f32,
-    pictures_taken: u32,
     wants_to_close: bool,
     control_held: bool,
 }
@@ -201,6 +205,14 @@ impl ApplicationHandler for App {
             }
         }
     }
+}
+
+/// The first of `stem-001.ending`, `stem-002.ending` … that is not there yet.
+fn unused_name(stem: &str, ending: &str) -> PathBuf {
+    (1_u32..)
+        .map(|number| PathBuf::from(format!("{stem}-{number:03}.{ending}")))
+        .find(|path| !path.exists())
+        .expect("a folder has a bound on its files")
 }
 
 impl Shown {
@@ -281,12 +293,12 @@ impl Shown {
             state,
             history: History::default(),
             recording: Recording::new(scene_name.to_owned(), threads),
+            take: None,
             threads,
             view_px: [0, 0, 1, 1],
             cursor_px: Vec2::ZERO,
             last_frame: Instant::now(),
             owed_s: 0.0,
-            pictures_taken: 0,
             wants_to_close: false,
             control_held: false,
         })
@@ -420,6 +432,8 @@ impl Shown {
             KeyCode::KeyP => self.play_script(),
             KeyCode::KeyS | KeyCode::F12 => self.state.screenshot = true,
             KeyCode::KeyC => self.reset_camera(),
+            KeyCode::KeyO => self.record_or_stop(),
+            KeyCode::KeyK => self.save_scene(),
             KeyCode::Escape => self.wants_to_close = true,
             KeyCode::KeyQ if self.control_held => self.wants_to_close = true,
             KeyCode::Tab => self.state.panel_open = !self.state.panel_open,
@@ -432,6 +446,53 @@ impl Shown {
         self.session.reset();
         self.session.script_plays = false;
         self.history = History::default();
+        self.begin_take_again();
+    }
+
+    /// A take that is under way goes on from rest.
+    fn begin_take_again(&mut self) {
+        if let Some(take) = &mut self.take {
+            *take = Take::default();
+        }
+    }
+
+    /// Starts a take from rest, or ends one and saves it.
+    fn record_or_stop(&mut self) {
+        match self.take.take() {
+            None => {
+                self.hand = None;
+                self.drag = Drag::Nothing;
+                self.reset();
+                self.take = Some(Take::default());
+                self.state.paused = false;
+                self.state.message = "recording from rest".to_owned();
+            }
+            Some(take) if take.is_empty() => self.state.message = "nothing was recorded".to_owned(),
+            Some(take) => {
+                let about = format!(
+                    "# Recorded by hand in palpate's window. Its replay ends in the state\n# {}\n\n",
+                    self.session.state_sha256()
+                );
+                self.save(&take.scene(&self.session), &about);
+            }
+        }
+        self.state.records = self.take.is_some();
+    }
+
+    /// Saves the scene as it is now, with the knobs as they were turned.
+    fn save_scene(&mut self) {
+        self.save(&self.session.scene.clone(), "");
+    }
+
+    /// Saves a scene below the comment `about`.
+    fn save(&mut self, scene: &Scene, about: &str) {
+        let path = unused_name("palpate", "toml");
+        let saved = scene.to_toml().map_err(AppError::from);
+        let saved = saved.and_then(|text| Ok(write(&path, (about.to_owned() + &text).as_bytes())?));
+        match saved {
+            Ok(()) => self.state.message = format!("saved {}", path.display()),
+            Err(error) => self.state.error = Some(error.to_string()),
+        }
     }
 
     fn reset_camera(&mut self) {
@@ -480,6 +541,9 @@ impl Shown {
             self.session.hand = self.hand.map(|hand| hand.tool(&self.state.hand));
             let tick = self.session.tick();
             sample.add_tick(&tick);
+            if let Some(take) = &mut self.take {
+                take.add(&self.session);
+            }
             self.state.asleep = tick.report.asleep;
             self.state.frozen_particles = tick.report.frozen_particles;
             last_tick = Some(tick);
@@ -589,6 +653,18 @@ impl Shown {
             }
             PanelAsk::Solver => {
                 self.session.set_solver();
+                // A script has one solver from its start on.
+                if self.take.is_some() {
+                    self.reset();
+                }
+                Ok(())
+            }
+            PanelAsk::Record => {
+                self.record_or_stop();
+                Ok(())
+            }
+            PanelAsk::SaveScene => {
+                self.save_scene();
                 Ok(())
             }
             PanelAsk::Reset => {
@@ -605,7 +681,9 @@ impl Shown {
             }
         };
         // What fails here leaves the old scene running and says why.
-        self.state.error = result.err().map(|e| e.to_string());
+        if let Err(error) = result {
+            self.state.error = Some(error.to_string());
+        }
         self.state.wants_frame = true;
     }
 
@@ -621,6 +699,7 @@ impl Shown {
         self.state.hand = HandKnobs::for_size(self.session.rest.longest_m());
         self.state.scene_name = name.to_owned();
         self.history = History::default();
+        (self.take, self.state.records) = (None, false);
         self.show_new_picture();
         Ok(())
     }
@@ -632,20 +711,11 @@ impl Shown {
     }
 
     fn screenshot(&mut self) -> Result<(), AppError> {
-        let path = loop {
-            self.pictures_taken += 1;
-            let path = PathBuf::from(format!("palpate-{:03}.png", self.pictures_taken));
-            if !Path::new(&path).exists() {
-                break path;
-            }
-        };
-        self.state.error = match write_png(&path, &self.renderer.picture()?) {
-            Ok(()) => {
-                self.state.message = format!("saved {}", path.display());
-                None
-            }
-            Err(e) => Some(e.to_string()),
-        };
+        let path = unused_name("palpate", "png");
+        match write_png(&path, &self.renderer.picture()?) {
+            Ok(()) => self.state.message = format!("saved {}", path.display()),
+            Err(error) => self.state.error = Some(error.to_string()),
+        }
         Ok(())
     }
 

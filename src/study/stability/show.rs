@@ -270,7 +270,10 @@ fn map_of_starts(rows: &[StabilityRow]) -> Option<MapChart> {
 
 /// Modulus against Poisson's ratio.
 fn map_of_ratios(rows: &[StabilityRow]) -> Option<MapChart> {
-    let hanging = of_kind(rows, Kind::Hang);
+    let hanging = nothing_else_changed(rows, Kind::Hang, |cell, base| {
+        cell.poisson_ratio = base.poisson_ratio;
+        cell.youngs_modulus_pa = base.youngs_modulus_pa;
+    });
     let ratios = ascending(hanging.iter().map(|row| row.cell.poisson_ratio));
     let moduli = moduli(&hanging);
     let default = SolverParams::default();
@@ -278,7 +281,7 @@ fn map_of_ratios(rows: &[StabilityRow]) -> Option<MapChart> {
         panel(
             method.name().to_owned(),
             &hanging,
-            |row| row.cell.method == method && row.cell.substeps == default.substeps,
+            |row| row.cell.method == method,
             (&ratios, |row| row.cell.poisson_ratio),
             (&moduli, |row| row.cell.youngs_modulus_pa),
         )
