@@ -7,6 +7,7 @@ use crate::gpu::Gpu;
 use crate::measure::against::compare_runs;
 use crate::measure::files::{create_folder, encode_png, write};
 use crate::measure::pictures::PictureTolerance;
+use crate::measure::preview::Preview;
 use crate::measure::states::{Nearness, States};
 use crate::scene::Scene;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -91,6 +92,10 @@ pub fn replay(options: &ReplayOptions) -> Result<Outcome, AppError> {
     }
     let mut run = Run::new(scene, thread_count(options.threads), options)?;
     run.all_frames(options)?;
+    let output = &run.session.scene.output;
+    let picture_s = f64::from(output.png_every) * f64::from(run.session.scene.solver.timestep_s);
+    run.preview
+        .write(&options.out.join("preview.apng"), picture_s)?;
     run.recording
         .write(&options.out, &run.session, run.renderer.as_ref())?;
     match &options.against {
@@ -134,6 +139,7 @@ struct Run {
     session: Session,
     renderer: Option<Renderer>,
     recording: Recording,
+    preview: Preview,
 }
 
 impl Run {
@@ -153,6 +159,7 @@ impl Run {
         remove_old_pictures(&options.out)?;
         Ok(Self {
             recording: Recording::new(options.scene.clone(), threads),
+            preview: Preview::default(),
             session,
             renderer,
         })
@@ -186,12 +193,13 @@ impl Run {
         Ok(())
     }
 
-    /// Frame 0, the body at rest: sampled, drawn and dumped where asked for, but not logged.
+    /// Frame 0, the body at rest: sampled, drawn, dumped where asked for, but not logged. It is the warm-up:
+    /// what an adapter puts off until it first draws is done here.
     fn rest_frame(&mut self, options: &ReplayOptions) -> Result<(), AppError> {
         self.recording.sample(&self.session);
         let wants_picture = self.session.scene.output.png_every > 0;
         let wants_dump = options.dumps.contains(&0);
-        if wants_picture || wants_dump {
+        if self.renderer.is_some() {
             self.draw()?;
             self.recording.first_frame_done();
         }
@@ -215,8 +223,10 @@ impl Run {
     fn picture(&mut self, out: &Path) -> Result<(), AppError> {
         if let Some(renderer) = &self.renderer {
             let file = out.join(format!("frame-{:04}.png", self.session.frame()));
-            let png = encode_png(&file, &renderer.picture()?)?;
+            let picture = renderer.picture()?;
+            let png = encode_png(&file, &picture)?;
             write(&file, &png)?;
+            self.preview.add(&picture);
             self.recording.add_picture(self.session.frame(), png);
         }
         Ok(())
@@ -245,13 +255,20 @@ fn remove_old_pictures(out: &Path) -> Result<(), AppError> {
         let is_picture = path
             .file_name()
             .and_then(|name| name.to_str())
-            .and_then(|name| name.strip_prefix("frame-")?.strip_suffix(".png"))
-            .is_some_and(|number| number.bytes().all(|b| b.is_ascii_digit()));
+            .is_some_and(is_run_picture);
         if is_picture {
             std::fs::remove_file(&path).map_err(failed)?;
         }
     }
     Ok(())
+}
+
+/// Whether a replay gives its pictures such names.
+fn is_run_picture(name: &str) -> bool {
+    let number = name
+        .strip_prefix("frame-")
+        .and_then(|rest| rest.strip_suffix(".png"));
+    name == "preview.apng" || number.is_some_and(|number| number.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// Frames between two samples of the states: about ten samples a replay, whatever its length.

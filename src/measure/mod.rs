@@ -9,6 +9,7 @@ pub mod log;
 pub mod map;
 pub mod page;
 pub mod pictures;
+pub mod preview;
 pub mod report;
 pub mod scatter;
 pub mod states;

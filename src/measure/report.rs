@@ -96,6 +96,10 @@ fn lead(summary: &Summary) -> String {
         ),
         None => "No frame was finished. ".to_owned(),
     };
+    if summary.adapter.is_some() {
+        lead +=
+            "Frame 0, the body at rest, was drawn first and is left out: it warms the adapter up. ";
+    }
     lead += &format!(
         "The volume was off by {} % at most and by {} % at the end.",
         number(100.0 * summary.volume_drift.max),
