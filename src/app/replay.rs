@@ -268,7 +268,8 @@ fn is_run_picture(name: &str) -> bool {
     let number = name
         .strip_prefix("frame-")
         .and_then(|rest| rest.strip_suffix(".png"));
-    name == "preview.apng" || number.is_some_and(|number| number.bytes().all(|b| b.is_ascii_digit()))
+    name == "preview.apng"
+        || number.is_some_and(|number| number.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// Frames between two samples of the states: about ten samples a replay, whatever its length.
