@@ -125,9 +125,9 @@ fn a_pass_left_out_or_another_tissue_is_found() {
     // The shadow is a pass; without it light falls behind the lobes, and nothing moves otherwise.
     let set = |name: &str, value: &str| {
         let out = folder(name);
-        let mut command = Run::command(&out, &arguments("liver", 44));
+        let mut command = Run::command(&out, &arguments("heart", 44));
         command.args(["--set", value, "--against"]);
-        command.arg(recordings().join("liver"));
+        command.arg(recordings().join("heart"));
         let output = command.output().expect("it runs");
         assert_eq!(output.status.code(), Some(1), "{}", messages(&output));
         messages(&output)
