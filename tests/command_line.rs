@@ -250,6 +250,44 @@ fn meshes_that_cant_be_used_are_refused_by_name() {
 }
 
 #[test]
+fn a_missing_file_is_named_once_and_an_ending_that_is_not_read_with_those_that_are() {
+    let folder = Folder::new("endings");
+    let missing = folder.path("nope.msh");
+    let output = palpate(&["check", &missing]);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(message.matches("nope.msh").count(), 1, "{message}");
+    let other = folder.write("body.stl", b"solid");
+    let set = format!("body.file='{other}'");
+    refused(
+        &["replay", "liver", "--no-render", "--set", &set],
+        &["body.stl", ".glb", ".obj", ".msh"],
+    );
+}
+
+#[test]
+fn results_are_not_put_where_a_file_is() {
+    let folder = Folder::new("out-is-a-file");
+    let file = folder.write("results", b"kept");
+    for out in [file.clone(), format!("{file}/below")] {
+        let words = ["results is a file", "folder"];
+        refused(
+            &[
+                "replay",
+                "slab",
+                "--no-render",
+                "--frames",
+                "1",
+                "--out",
+                &out,
+            ],
+            &words,
+        );
+        refused(&["study", "stretch", "--quick", "--out", &out], &words);
+    }
+    assert_eq!(std::fs::read(&file).expect("it is there"), b"kept");
+}
+
+#[test]
 fn bad_usage_ends_with_status_two() {
     refused(&["replay"], &["SCENE"]);
     refused(&["replay", "slab", "--size", "huge"], &["WIDTHxHEIGHT"]);

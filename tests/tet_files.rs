@@ -273,6 +273,58 @@ fn hexahedra_are_cut_so_that_their_faces_meet_whatever_way_they_close() {
 }
 
 #[test]
+fn a_mesh_far_from_the_origin_keeps_its_shape_and_is_moved_there() {
+    let near = sound(two_on_a_face(1.0, -1.0).format_2()).mesh;
+    let mut written = two_on_a_face(1.0, -1.0);
+    for (_, place) in &mut written.nodes {
+        // A round number of f64: what is lost is lost by this program. f32 has sixteenths there.
+        *place = [
+            0.03125 * place[0] + 1048576.0,
+            0.03125 * place[1],
+            0.03125 * place[2],
+        ];
+    }
+    let far = sound(written.format_2());
+    let edges = |mesh: &TetMesh| -> Vec<Vec3> {
+        mesh.particles
+            .iter()
+            .map(|&x| x - mesh.particles[0])
+            .collect()
+    };
+    for (a, b) in edges(&near).into_iter().zip(edges(&far.mesh)) {
+        assert!((0.03125 * a - b).length() < 1e-8, "{a} and {b}");
+    }
+    assert!(
+        all_notes(&far).contains("from the origin"),
+        "{}",
+        all_notes(&far)
+    );
+    assert!(far.mesh.particles.iter().all(|x| x.length() < 0.1));
+}
+
+#[test]
+fn names_of_any_length_leave_a_message_of_one_line() {
+    for start in ["", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"] {
+        for name in ["A", "End", "Nodes"] {
+            let message = refusal(format!("{start}${name}{}", "A".repeat(1_000_000)));
+            assert!(message.len() < 300, "{}", message.len());
+        }
+    }
+    let message = refusal(
+        cube()
+            .format_2()
+            .replace("2.2 0 8", &format!("{} 0 8", "2".repeat(100_000))),
+    );
+    assert!(message.len() < 300, "{}", message.len());
+    let message = refusal(cube().format_2().replacen(
+        "$EndNodes",
+        &format!("${}", "E".repeat(100_000)),
+        1,
+    ));
+    assert!(message.len() < 300, "{}", message.len());
+}
+
+#[test]
 fn what_is_not_read_is_refused_by_name_with_what_to_do() {
     let with_type = |number: u64, nodes: usize| {
         let mut written = cube();

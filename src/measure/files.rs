@@ -23,6 +23,11 @@ pub enum FileError {
         /// What the system says.
         source: io::Error,
     },
+    /// A folder is to be where a file is.
+    NoFolder {
+        /// The file.
+        file: PathBuf,
+    },
     /// It was read but does not hold what it should.
     Content {
         /// The file.
@@ -47,6 +52,11 @@ impl fmt::Display for FileError {
                     file.display()
                 )
             }
+            Self::NoFolder { file } => write!(
+                f,
+                "{} is a file, and the results need a folder: name another place",
+                file.display()
+            ),
             Self::Content { file, problem } => write!(f, "{}: {problem}", file.display()),
         }
     }
@@ -56,7 +66,7 @@ impl std::error::Error for FileError {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
             Self::Write { source, .. } | Self::Read { source, .. } => Some(source),
-            Self::Content { .. } => None,
+            Self::NoFolder { .. } | Self::Content { .. } => None,
         }
     }
 }
@@ -65,8 +75,13 @@ impl std::error::Error for FileError {
 ///
 /// # Errors
 ///
-/// [`FileError::Write`].
+/// [`FileError::NoFolder`] if it or one above it is a file, else [`FileError::Write`].
 pub fn create_folder(folder: &Path) -> Result<(), FileError> {
+    if let Some(file) = folder.ancestors().find(|above| above.is_file()) {
+        return Err(FileError::NoFolder {
+            file: file.to_owned(),
+        });
+    }
     std::fs::create_dir_all(folder).map_err(|source| FileError::Write {
         file: folder.to_owned(),
         source,

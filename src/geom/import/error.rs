@@ -100,7 +100,10 @@ impl ImportFault {
 
 impl fmt::Display for ImportError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.file.display(), self.fault)
+        match &self.fault {
+            ImportFault::Io { needed, .. } if *needed == self.file => self.fault.fmt(f),
+            fault => write!(f, "{}: {fault}", self.file.display()),
+        }
     }
 }
 
@@ -114,8 +117,8 @@ impl fmt::Display for ImportFault {
             ),
             Self::Ending => write!(
                 f,
-                "not a kind of file that is read as a surface; use .glb, .gltf or .obj, or .msh for \
-                 tetrahedra"
+                "not a kind of file that is read: a surface is a .glb, .gltf or .obj file, tetrahedra are a \
+                 .msh file"
             ),
             Self::TooLarge { what } => {
                 write!(f, "{what}; simplify the mesh in a modelling program first")
@@ -124,7 +127,7 @@ impl fmt::Display for ImportFault {
                 write!(f, "{place}: {problem}; export the file again or mend it")
             }
             Self::Unsupported { feature, remedy } => {
-                write!(f, "needs {feature}, which is not supported; {remedy}")
+                write!(f, "it uses {feature}, which is not supported; {remedy}")
             }
             Self::NoTriangles => write!(
                 f,

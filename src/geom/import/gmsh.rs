@@ -13,7 +13,7 @@ mod nodes;
 
 use super::error::ImportFault;
 use super::tets::{Cell, RawTets};
-use lines::{Line, Lines};
+use lines::{Line, Lines, shortened};
 use nodes::Nodes;
 
 /// The layouts that are read.
@@ -34,7 +34,7 @@ impl Format {
         let version = words.next("a version")?;
         if words.whole("a file type")? != 0 {
             return Err(ImportFault::Unsupported {
-                feature: "a binary Gmsh file".to_owned(),
+                feature: "binary content".to_owned(),
                 remedy: "save it as ASCII (in Gmsh: Mesh.Binary = 0)",
             });
         }
@@ -43,7 +43,7 @@ impl Format {
             "4.1" => Self::FourOne,
             other => {
                 return Err(ImportFault::Unsupported {
-                    feature: format!("version `{other}` of Gmsh's format"),
+                    feature: format!("version `{}` of Gmsh's format", shortened(other)),
                     remedy: "save it as version 2.2 or 4.1 (in Gmsh: Mesh.MshFileVersion = 4.1)",
                 });
             }
@@ -114,6 +114,7 @@ impl<'a> Reader<'a> {
                 remedy: "save the mesh without parametric coordinates",
             }),
             _ if name.starts_with("End") || name.starts_with("END") => {
+                let name = shortened(name);
                 Err(head.fault(format!("${name} closes a section that is not open")))
             }
             _ => self.lines.skip(name),

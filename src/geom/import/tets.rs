@@ -13,6 +13,10 @@ use partition::{Numbered, parts};
 use std::collections::HashSet;
 use std::path::Path;
 
+/// Tetrahedra farther from the origin of their file than this many times their extent are moved there:
+/// so far out f32 loses digits of every edge.
+const FAR_EXTENTS: f64 = 100.0;
+
 /// Items that a note names before it says how many more there are.
 const NAMED_MAX: usize = 8;
 
@@ -52,7 +56,8 @@ pub(super) struct RawTets {
 pub struct ImportedTets {
     /// The format and its version.
     pub format: String,
-    /// Nodes in the order of the file without those that no tetrahedron uses, in the file's unit.
+    /// Nodes in the order of the file without those that no tetrahedron uses, in the file's unit; about
+    /// the origin, if they lie far from that in the file.
     pub mesh: TetMesh,
     /// Shape of the tetrahedra.
     pub quality: TetQuality,
@@ -96,8 +101,9 @@ fn sound(raw: RawTets) -> Result<ImportedTets, ImportFault> {
     let mut notes = Vec::new();
     let mut tets = cut(&raw, &mut notes)?;
     drop_copies(&mut tets, &mut notes);
+    let origin = origin(&raw.nodes, &tets, &mut notes);
     let mut mesh = TetMesh {
-        particles: raw.nodes.iter().map(|x| x.as_vec3()).collect(),
+        particles: (raw.nodes.iter()).map(|x| (x - origin).as_vec3()).collect(),
         tets: Vec::new(),
     };
     partition::orient(&mesh.particles, &mut tets, &mut notes)?;
@@ -128,6 +134,24 @@ fn sound(raw: RawTets) -> Result<ImportedTets, ImportFault> {
         ignored: raw.ignored,
         notes,
     })
+}
+
+/// What is taken from all `nodes` before they are rounded: nothing, or the middle of `tets` that lie far
+/// out, which then come to lie about the origin.
+fn origin(nodes: &[DVec3], tets: &[Numbered], notes: &mut Vec<String>) -> DVec3 {
+    let used = || (tets.iter()).flat_map(|tet| tet.corners.map(|node| nodes[node as usize]));
+    let low = used().fold(DVec3::INFINITY, DVec3::min);
+    let high = used().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let middle = 0.5 * (low + high);
+    let is_far = middle.length() > FAR_EXTENTS * (high - low).max_element();
+    if !is_far {
+        return DVec3::ZERO;
+    }
+    notes.push(format!(
+        "the mesh lies {:.3e} from the origin of its file, in the file's unit: moved there",
+        middle.length()
+    ));
+    middle
 }
 
 /// The tetrahedra of the cells: their own, or those that hexahedra are cut into.

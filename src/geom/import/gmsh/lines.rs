@@ -65,7 +65,7 @@ impl<'a> Lines<'a> {
         if line.text.starts_with('$') {
             return Err(line.fault(format!(
                 "`{}` where ${name} has more to say: a count is wrong, or lines are missing",
-                line.text
+                shortened(line.text)
             )));
         }
         Ok(line)
@@ -114,7 +114,7 @@ impl<'a> Lines<'a> {
     fn cut_short(&self, name: &str) -> ImportFault {
         ImportFault::malformed(
             format!("line {}", self.number),
-            format!("the file ends within ${name}: it is cut short"),
+            format!("the file ends within ${}: it is cut short", shortened(name)),
         )
     }
 }
@@ -127,7 +127,7 @@ fn ends(line: &[u8], name: &str) -> bool {
 }
 
 /// `text`, or its beginning.
-fn shortened(text: &str) -> String {
+pub(super) fn shortened(text: &str) -> String {
     const CHARS_MAX: usize = 40;
     match text.char_indices().nth(CHARS_MAX) {
         Some((end, _)) => format!("{}…", &text[..end]),
