@@ -193,14 +193,16 @@ pub struct Corner {
     pub inverse_mass: Lanes,
 }
 
-/// The particles, for the parts of one round to read and write at the same time.
+/// One number four times a particle, for the parts of one round to read and write at the same time.
 ///
-/// Sound as long as no two parts that run together name the same particle and every index is
-/// inside: [`Batches`] alone makes batches' corners, and sees to both while it runs them; an access
-/// made by [`ParticleAccess::reading`] is for as many places, and for nobody else meanwhile.
+/// Nothing is checked in a release: what reads and writes through it is unsafe, with one contract. The
+/// corner is of [`Batches`] made for as many particles as the access is of, and no other thread touches
+/// particles of that corner meanwhile. [`Batches::for_each_part`] sees to both for the batches that it
+/// hands out, and for any other access of the same length that only they use meanwhile.
 #[derive(Clone, Copy)]
 pub struct ParticleAccess {
     first: *mut Vec4,
+    length: usize,
 }
 
 // SAFETY: the parts of one round touch disjoint particles (see `for_each_part`).
@@ -209,19 +211,38 @@ unsafe impl Send for ParticleAccess {}
 unsafe impl Sync for ParticleAccess {}
 
 impl ParticleAccess {
-    /// Access for code that only gathers and runs alone.
-    pub fn reading(particles: &mut [Vec4]) -> Self {
+    /// Access to `particles`, spare places and all.
+    pub fn new(particles: &mut [Vec4]) -> Self {
         Self {
             first: particles.as_mut_ptr(),
+            length: particles.len(),
         }
     }
 
-    /// Reads one corner of eight constraints. `WIDE` is for code compiled for AVX.
+    /// Where a particle is kept.
+    ///
+    /// # Safety
+    ///
+    /// There is one of that index.
     #[inline(always)]
-    pub fn gather<const WIDE: bool>(self, corner: &[u32; LANES]) -> Corner {
-        // SAFETY: indices were checked when the batches were made, and no other batch that runs now
-        // writes these particles.
-        let rows = corner.map(|index| unsafe { *self.first.add(index as usize) });
+    unsafe fn at(self, index: u32) -> *mut Vec4 {
+        debug_assert!(
+            (index as usize) < self.length,
+            "corners are of these particles"
+        );
+        // SAFETY: inside the slice, says the caller.
+        unsafe { self.first.add(index as usize) }
+    }
+
+    /// Reads one corner of eight constraints. `WIDE` is for code compiled for AVX.
+    ///
+    /// # Safety
+    ///
+    /// See [`ParticleAccess`].
+    #[inline(always)]
+    pub unsafe fn gather<const WIDE: bool>(self, corner: &[u32; LANES]) -> Corner {
+        // SAFETY: the caller keeps the contract.
+        let rows = corner.map(|index| unsafe { *self.at(index) });
         let [x, y, z, inverse_mass] = columns_of::<WIDE>(rows);
         Corner {
             position: Lanes3 { x, y, z },
@@ -230,8 +251,12 @@ impl ParticleAccess {
     }
 
     /// Writes one corner of eight constraints back.
+    ///
+    /// # Safety
+    ///
+    /// See [`ParticleAccess`].
     #[inline(always)]
-    pub fn scatter(self, corner: &[u32; LANES], value: Corner) {
+    pub unsafe fn scatter(self, corner: &[u32; LANES], value: Corner) {
         for lane in 0..LANES {
             let particle = Vec4::new(
                 value.position.x.0[lane],
@@ -239,17 +264,32 @@ impl ParticleAccess {
                 value.position.z.0[lane],
                 value.inverse_mass.0[lane],
             );
-            // SAFETY: as in `gather`. Unused lanes all write the value they read.
-            unsafe { *self.first.add(corner[lane] as usize) = particle };
+            // SAFETY: the caller keeps the contract. Unused lanes all write the value they read.
+            unsafe { *self.at(corner[lane]) = particle };
         }
     }
-}
 
-impl ParticleAccess {
-    /// Adds `change` to one corner of eight constraints and `factor` times it to the same corner
-    /// in `other`; the fourth numbers stay.
+    /// Adds `change` to one corner of eight constraints; the fourth numbers stay.
+    ///
+    /// # Safety
+    ///
+    /// See [`ParticleAccess`].
     #[inline(always)]
-    pub fn add<const WIDE: bool>(
+    pub unsafe fn add<const WIDE: bool>(self, corner: &[u32; LANES], change: Lanes3) {
+        let rows = rows_of::<WIDE>(change);
+        for lane in 0..LANES {
+            // SAFETY: the caller keeps the contract.
+            unsafe { *self.at(corner[lane]) += rows[lane] };
+        }
+    }
+
+    /// The same, and adds `factor` times as much to the same corner in `other`.
+    ///
+    /// # Safety
+    ///
+    /// See [`ParticleAccess`], for both.
+    #[inline(always)]
+    pub unsafe fn add_to_both<const WIDE: bool>(
         self,
         corner: &[u32; LANES],
         change: Lanes3,
@@ -258,11 +298,10 @@ impl ParticleAccess {
     ) {
         let rows = rows_of::<WIDE>(change);
         for lane in 0..LANES {
-            let index = corner[lane] as usize;
-            // SAFETY: as in `gather`.
+            // SAFETY: the caller keeps the contract.
             unsafe {
-                *self.first.add(index) += rows[lane];
-                *other.first.add(index) += factor * rows[lane];
+                *self.at(corner[lane]) += rows[lane];
+                *other.at(corner[lane]) += factor * rows[lane];
             }
         }
     }
@@ -432,9 +471,7 @@ impl<B: Send + Sync> Batches<B> {
             self.particle_count + SPARE,
             "the particles the batches were made for"
         );
-        let access = ParticleAccess {
-            first: particles.as_mut_ptr(),
-        };
+        let access = ParticleAccess::new(particles);
         let batches = SharedSlice::new(&mut self.batches);
         let mut first = 0;
         for ends in &self.rounds {

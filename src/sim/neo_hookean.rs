@@ -185,7 +185,7 @@ impl NeoHookean {
         if self.ready_for != Some(*params) {
             self.make_ready(team, particles, params);
         } else if self.sheds || self.overloaded {
-            let (step, places) = (self.step, reading(particles));
+            let (step, places) = (self.step, ParticleAccess::new(particles));
             self.tets
                 .for_each_part(team, &mut self.accelerations, |run, accelerations| {
                     run_avx(run, Work::Shed, places, accelerations, places, step);
@@ -197,8 +197,8 @@ impl NeoHookean {
     /// One sweep over all tetrahedra.
     pub fn project(&mut self, team: &Team, particles: &mut [Vec4]) {
         let step = self.step;
-        let sound = reading(&mut self.sound);
-        let accelerations = reading(&mut self.accelerations);
+        let sound = ParticleAccess::new(&mut self.sound);
+        let accelerations = ParticleAccess::new(&mut self.accelerations);
         let work = if self.restoring {
             Work::Restore
         } else {
@@ -225,10 +225,13 @@ impl NeoHookean {
     /// Mean of κ over all tetrahedra.
     fn mean_stiffness(&self, particles: &[Vec4], params: &SolverParams) -> f32 {
         let step = step_of(params);
-        let batches = self.tets.as_slice().iter();
-        let sum: f64 = batches
-            .map(|batch| stiffnesses(batch, particles, step).iter().sum::<f64>())
-            .sum();
+        let mut sum = 0.0;
+        for batch in self.tets.as_slice() {
+            for lane in 0..LANES {
+                let k = f64::from(step.h2_s2 * batch.volume_m3.0[lane]);
+                sum += stiffness(mobility(batch, lane, particles), k, step);
+            }
+        }
         (sum / self.tet_count.max(1) as f64) as f32
     }
 
@@ -297,7 +300,7 @@ impl NeoHookean {
     }
 
     fn standing(&self, team: &Team, particles: &mut [Vec4]) -> Residual {
-        let places = reading(particles);
+        let places = ParticleAccess::new(particles);
         let volume_min = WRECKED_VOLUMES[usize::from(self.restoring)];
         let chunks: Vec<&[Batch]> = self.tets.as_slice().chunks(BATCHES_PER_CHUNK).collect();
         let standings = team.map(chunks.len(), |chunk| {
@@ -322,15 +325,14 @@ impl NeoHookean {
             self.carry = Carry::Most;
         }
         let own_max = CARRIED_STIFFNESS_MAX[1] * params.iterations as f32;
-        let (mean, mean_max) = (
-            self.mean_stiffness(particles, params),
-            self.mean_max(params),
-        );
+        let mean_max = self.mean_max(params);
+        let mut stiffness_sum = 0.0;
         for batch in self.tets.as_mut_slice() {
-            let stiffness = stiffnesses(batch, particles, step);
             for lane in 0..LANES {
                 let k = f64::from(step.h2_s2 * batch.volume_m3.0[lane]);
                 let mobility = mobility(batch, lane, particles);
+                let stiffness = stiffness(mobility, k, step);
+                stiffness_sum += stiffness;
                 let shear = k * f64::from(OWN_RESPONSE * STIFFNESS_IN_MU * step.mu_pa);
                 let response = mobility * (DMat3::IDENTITY + mobility * shear).inverse();
                 let [x, y, z] = [response.x_axis, response.y_axis, response.z_axis];
@@ -338,9 +340,10 @@ impl NeoHookean {
                 for (entry, value) in entries.iter().enumerate() {
                     batch.response[entry].0[lane] = *value as f32;
                 }
-                batch.kept.0[lane] = own_max / (stiffness[lane] as f32).max(own_max);
+                batch.kept.0[lane] = own_max / (stiffness as f32).max(own_max);
             }
         }
+        let mean = (stiffness_sum / self.tet_count.max(1) as f64) as f32;
         self.kept_by_all = mean_max / mean.max(mean_max);
         self.sheds = false;
         for batch in self.tets.as_mut_slice() {
@@ -350,7 +353,7 @@ impl NeoHookean {
             }
         }
         self.accelerations.fill(Vec4::ZERO);
-        let places = reading(particles);
+        let places = ParticleAccess::new(particles);
         self.tets
             .for_each_part(team, &mut self.accelerations, |run, accelerations| {
                 for batch in run {
@@ -360,14 +363,10 @@ impl NeoHookean {
     }
 }
 
-/// κ of each tetrahedron, 0 where a lane is not used.
-fn stiffnesses(batch: &Batch, particles: &[Vec4], step: Step) -> [f64; LANES] {
-    std::array::from_fn(|lane| {
-        let k = f64::from(step.h2_s2 * batch.volume_m3.0[lane]);
-        let mobility = mobility(batch, lane, particles);
-        let trace = mobility.x_axis.x + mobility.y_axis.y + mobility.z_axis.z;
-        k * trace * f64::from(step.bulk_pa + step.mu_pa)
-    })
+/// κ of a tetrahedron of this mobility S, with k = h² V; 0 where a lane is not used.
+fn stiffness(mobility: DMat3, k: f64, step: Step) -> f64 {
+    let trace = mobility.x_axis.x + mobility.y_axis.y + mobility.z_axis.z;
+    k * trace * f64::from(step.bulk_pa + step.mu_pa)
 }
 
 /// S = Σ w g gᵀ of one tetrahedron [1/(kg m²)].
@@ -395,10 +394,6 @@ fn step_of(params: &SolverParams) -> Step {
         h2_s2: params.substep_s() * params.substep_s(),
         carried_max_pa: CARRIED_STRESS_IN_E * params.youngs_modulus_pa,
     }
-}
-
-fn reading(particles: &mut [Vec4]) -> ParticleAccess {
-    ParticleAccess::reading(particles)
 }
 
 /// What is done to a run of batches.

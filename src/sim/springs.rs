@@ -129,7 +129,7 @@ impl Springs {
     /// there are.
     pub fn residual(&self, particles: &mut [Vec4], lame: Lame, substep_s: f32) -> (f64, usize) {
         let compliance = Compliance::new(lame, substep_s);
-        let access = ParticleAccess::reading(particles);
+        let access = ParticleAccess::new(particles);
         let (mut sum, mut count) = (0.0, 0);
         // Both corners of a lane that is not used are the same spare place.
         let mut add = |corners: [&[u32; LANES]; 2], residual: Lanes, rest: Lanes| {
@@ -139,14 +139,17 @@ impl Springs {
             }
         };
         for batch in self.edges.as_slice() {
-            let corners = [0, 1].map(|k| access.gather::<false>(&batch.corners[k]));
+            // SAFETY: the batches are of these particles, and nothing else runs.
+            let corners = [0, 1].map(|k| unsafe { access.gather::<false>(&batch.corners[k]) });
             let residual = edge_value(batch, &corners).0
                 + batch.geometry.times(compliance.edge) * batch.lambda;
             add(batch.corners.each_ref(), residual, batch.rest_length);
         }
         if let Some(compliance) = compliance.volume {
             for batch in self.volumes.as_slice() {
-                let corners = [0, 1, 2, 3].map(|k| access.gather::<false>(&batch.corners[k]));
+                // SAFETY: as above.
+                let corners =
+                    [0, 1, 2, 3].map(|k| unsafe { access.gather::<false>(&batch.corners[k]) });
                 let residual = volume_value(batch, &corners).0
                     + batch.geometry.times(compliance) * batch.lambda;
                 let ends = [&batch.corners[0], &batch.corners[1]];
@@ -211,10 +214,13 @@ fn edge_value(batch: &EdgeBatch, corners: &[Corner; 2]) -> (Lanes, Lanes3) {
 
 #[inline(always)]
 fn project_edge_batch(batch: &mut EdgeBatch, access: ParticleAccess, compliance: f32) {
-    let mut corners = [
-        access.gather::<false>(&batch.corners[0]),
-        access.gather::<false>(&batch.corners[1]),
-    ];
+    // SAFETY: a batch works in the part that `for_each_part` gives it.
+    let mut corners = unsafe {
+        [
+            access.gather::<false>(&batch.corners[0]),
+            access.gather::<false>(&batch.corners[1]),
+        ]
+    };
     let (value, direction) = edge_value(batch, &corners);
     let alpha = batch.geometry.times(compliance);
     let effective = (corners[0].inverse_mass + corners[1].inverse_mass) * direction.dot(direction);
@@ -223,8 +229,11 @@ fn project_edge_batch(batch: &mut EdgeBatch, access: ParticleAccess, compliance:
     let step = direction.scaled(delta);
     corners[0].position = corners[0].position + step.scaled(corners[0].inverse_mass);
     corners[1].position = corners[1].position - step.scaled(corners[1].inverse_mass);
-    access.scatter(&batch.corners[0], corners[0]);
-    access.scatter(&batch.corners[1], corners[1]);
+    // SAFETY: as above.
+    unsafe {
+        access.scatter(&batch.corners[0], corners[0]);
+        access.scatter(&batch.corners[1], corners[1]);
+    }
 }
 
 /// Value and gradients of `constraint::volume`.
@@ -243,12 +252,15 @@ fn volume_value(batch: &VolumeBatch, corners: &[Corner; 4]) -> (Lanes, [Lanes3; 
 
 #[inline(always)]
 fn project_volume_batch(batch: &mut VolumeBatch, access: ParticleAccess, compliance: f32) {
-    let mut corners = [
-        access.gather::<false>(&batch.corners[0]),
-        access.gather::<false>(&batch.corners[1]),
-        access.gather::<false>(&batch.corners[2]),
-        access.gather::<false>(&batch.corners[3]),
-    ];
+    // SAFETY: a batch works in the part that `for_each_part` gives it.
+    let mut corners = unsafe {
+        [
+            access.gather::<false>(&batch.corners[0]),
+            access.gather::<false>(&batch.corners[1]),
+            access.gather::<false>(&batch.corners[2]),
+            access.gather::<false>(&batch.corners[3]),
+        ]
+    };
     let (value, gradient) = volume_value(batch, &corners);
     let alpha = batch.geometry.times(compliance);
     let mut effective = alpha;
@@ -260,7 +272,8 @@ fn project_volume_batch(batch: &mut VolumeBatch, access: ParticleAccess, complia
     for k in 0..4 {
         let step = gradient[k].scaled(delta * corners[k].inverse_mass);
         corners[k].position = corners[k].position + step;
-        access.scatter(&batch.corners[k], corners[k]);
+        // SAFETY: as above.
+        unsafe { access.scatter(&batch.corners[k], corners[k]) };
     }
 }
 
@@ -351,7 +364,7 @@ mod tests {
         // The edge 0–1 comes first and is the only one of its colour that can move.
         project_edges(
             &mut springs.edges.as_mut_slice()[..1],
-            ParticleAccess::reading(&mut places),
+            ParticleAccess::new(&mut places),
             compliance,
         );
         assert!(places[0].truncate().distance(expected) < 1e-8);

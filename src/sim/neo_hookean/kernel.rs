@@ -65,12 +65,16 @@ pub struct Standing {
 impl Batch {
     #[inline(always)]
     fn gather<const WIDE: bool>(&self, access: ParticleAccess) -> [Corner; 4] {
-        [
-            access.gather::<WIDE>(&self.corners[0]),
-            access.gather::<WIDE>(&self.corners[1]),
-            access.gather::<WIDE>(&self.corners[2]),
-            access.gather::<WIDE>(&self.corners[3]),
-        ]
+        // SAFETY: a batch is one of `Batches`, and works in the part that `for_each_part` gives it or
+        // where nothing else runs; every access of a body is as long as its particles.
+        unsafe {
+            [
+                access.gather::<WIDE>(&self.corners[0]),
+                access.gather::<WIDE>(&self.corners[1]),
+                access.gather::<WIDE>(&self.corners[2]),
+                access.gather::<WIDE>(&self.corners[3]),
+            ]
+        }
     }
 
     /// Columns of [a b c] · rest inverse.
@@ -92,8 +96,25 @@ impl Batch {
         Deformation { f, cofactor, j }
     }
 
-    /// Lets a change D of the stress act: −V w D g on the acceleration of each corner, and h² times
-    /// that on its place.
+    /// What a change D of the stress does to the acceleration of each corner, −V w D g.
+    #[inline(always)]
+    fn accelerations(&self, corners: &[Corner; 4], change: [Lanes3; 3]) -> [Lanes3; 4] {
+        let rows = &self.rest_inverse;
+        let v = -self.volume_m3;
+        let d1 = along(change, rows[0]);
+        let d2 = along(change, rows[1]);
+        let d3 = along(change, rows[2]);
+        let d0 = -(d1 + d2 + d3);
+        [
+            d0.scaled(v * corners[0].inverse_mass),
+            d1.scaled(v * corners[1].inverse_mass),
+            d2.scaled(v * corners[2].inverse_mass),
+            d3.scaled(v * corners[3].inverse_mass),
+        ]
+    }
+
+    /// Lets a change of the stress act on the acceleration of each corner, and h² times that on its
+    /// place.
     #[inline(always)]
     fn act<const WIDE: bool>(
         &self,
@@ -103,23 +124,30 @@ impl Batch {
         accelerations: ParticleAccess,
         h2_s2: f32,
     ) {
-        let rows = &self.rest_inverse;
-        let v = -self.volume_m3;
-        let d1 = along(change, rows[0]);
-        let d2 = along(change, rows[1]);
-        let d3 = along(change, rows[2]);
-        let d0 = -(d1 + d2 + d3);
-        let [a0, a1, a2, a3] = [
-            d0.scaled(v * corners[0].inverse_mass),
-            d1.scaled(v * corners[1].inverse_mass),
-            d2.scaled(v * corners[2].inverse_mass),
-            d3.scaled(v * corners[3].inverse_mass),
-        ];
+        let [a0, a1, a2, a3] = self.accelerations(corners, change);
         // No loop: the compiler would keep it and send the lanes through memory.
-        accelerations.add::<WIDE>(&self.corners[0], a0, places, h2_s2);
-        accelerations.add::<WIDE>(&self.corners[1], a1, places, h2_s2);
-        accelerations.add::<WIDE>(&self.corners[2], a2, places, h2_s2);
-        accelerations.add::<WIDE>(&self.corners[3], a3, places, h2_s2);
+        // SAFETY: as in `gather`.
+        unsafe {
+            accelerations.add_to_both::<WIDE>(&self.corners[0], a0, places, h2_s2);
+            accelerations.add_to_both::<WIDE>(&self.corners[1], a1, places, h2_s2);
+            accelerations.add_to_both::<WIDE>(&self.corners[2], a2, places, h2_s2);
+            accelerations.add_to_both::<WIDE>(&self.corners[3], a3, places, h2_s2);
+        }
+    }
+
+    /// Lets a change of the stress act on the accelerations alone.
+    #[inline(always)]
+    fn accelerate<const WIDE: bool>(
+        &self,
+        particles: ParticleAccess,
+        change: [Lanes3; 3],
+        accelerations: ParticleAccess,
+    ) {
+        let changes = self.accelerations(&self.gather::<WIDE>(particles), change);
+        for (corner, change) in self.corners.iter().zip(changes) {
+            // SAFETY: as in `gather`.
+            unsafe { accelerations.add::<WIDE>(corner, change) };
+        }
     }
 
     /// Columns times the symmetric 3×3 response.
@@ -240,8 +268,7 @@ impl Batch {
             change[i] = self.stress[i].scaled(kept - Lanes::splat(1.0));
             self.stress[i] = self.stress[i].scaled(kept);
         }
-        let corners = self.gather::<WIDE>(particles);
-        self.act::<WIDE>(&corners, change, particles, accelerations, 0.0);
+        self.accelerate::<WIDE>(particles, change, accelerations);
     }
 
     /// Adds what the stress as it is does to the accelerations.
@@ -251,8 +278,7 @@ impl Batch {
         particles: ParticleAccess,
         accelerations: ParticleAccess,
     ) {
-        let corners = self.gather::<WIDE>(particles);
-        self.act::<WIDE>(&corners, self.stress, particles, accelerations, 0.0);
+        self.accelerate::<WIDE>(particles, self.stress, accelerations);
     }
 
     /// What is left of the equations, and who is wrecked. A body on its way back must do better

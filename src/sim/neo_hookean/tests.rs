@@ -174,6 +174,24 @@ fn kernel_check_rejects_another_stiffness() {
 }
 
 #[test]
+fn what_acts_on_accelerations_alone_leaves_places_to_the_bit() {
+    let (mesh, mut places) = eight(&some_moves());
+    let mut model = model(&mesh);
+    model.begin_substep(&Team::alone(), &mut places, &PARAMS);
+    let before = places.clone();
+    let accelerations = ParticleAccess::new(&mut model.accelerations);
+    let access = ParticleAccess::new(&mut places);
+    for batch in model.tets.as_mut_slice() {
+        // Nothing times infinity is no number.
+        batch.stress[0].x = Lanes::splat(f32::INFINITY);
+        batch.accelerate_anew::<false>(access, accelerations);
+        batch.shed::<false>(access, accelerations, model.step);
+    }
+    assert_eq!(places, before);
+    assert!(model.accelerations.iter().any(|a| !a.is_finite()));
+}
+
+#[test]
 fn narrow_and_wide_vectors_give_the_same_bits() {
     let (mesh, places) = eight(&some_moves());
     let mut found = Vec::new();
@@ -181,8 +199,8 @@ fn narrow_and_wide_vectors_give_the_same_bits() {
         let (mut model, mut places) = (model(&mesh), places.clone());
         model.begin_substep(&Team::alone(), &mut places, &PARAMS);
         let step = model.step;
-        let accelerations = reading(&mut model.accelerations);
-        let access = reading(&mut places);
+        let accelerations = ParticleAccess::new(&mut model.accelerations);
+        let access = ParticleAccess::new(&mut places);
         for batch in model.tets.as_mut_slice() {
             #[cfg(target_arch = "x86_64")]
             if wide && std::arch::is_x86_feature_detected!("avx2") {
