@@ -87,6 +87,19 @@ pub struct ActiveContact {
     pub slopes: [Vec3; CARRIERS_MAX],
     /// Radius of the tool there [m].
     pub radius_m: f32,
+    /// Radius of the tool [m].
+    pub tool_radius_m: f32,
+}
+
+/// How far apart the axes of two tools are [m], and the direction from the first to the second; zero
+/// where they meet.
+pub fn between(first: (ToolShape, Vec3), second: (ToolShape, Vec3)) -> (f32, Vec3) {
+    let axis = [Vec3::ZERO, first.0.axis_m()];
+    let start = second.1 - first.1;
+    let end = start + second.0.axis_m();
+    let found = nearest(axis, [start, end, end]);
+    let way = blend(found.weights, [start, end, end]) - found.foot;
+    (way.length(), way.normalize_or_zero())
 }
 
 /// What one tool touches.
@@ -291,6 +304,7 @@ impl Contacts {
             multiplier: touch.multiplier,
             slopes: touch.slopes,
             radius_m: touch.radius_m,
+            tool_radius_m: tool.shape.radius_m(),
         })
     }
 

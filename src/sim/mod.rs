@@ -283,6 +283,10 @@ pub struct StepReport {
     pub frozen_particles: usize,
     /// Fastest particle at the end of the step [m/s].
     pub speed_max_m_s: f32,
+    /// The body is wrecked, and led back to its last sound shape: forces mean nothing.
+    pub restoring: bool,
+    /// Pushing tools that do nothing, since they leave tissue no room between themselves and another.
+    pub yielding_tools: usize,
     /// Nothing moved and nothing was computed; forces are those of a tool that rests on the body or
     /// holds it, as they were when it fell asleep.
     pub asleep: bool,

@@ -69,8 +69,7 @@ impl Model {
     pub fn is_restoring(&self) -> bool {
         match self {
             Self::MassSpring(_) | Self::Springs(_) => false,
-            // What it leads back it stops itself.
-            Self::Implicit(_) => false,
+            Self::Implicit(model) => model.is_restoring(),
             Self::NeoHookean(model) => model.is_restoring(),
         }
     }

@@ -362,6 +362,8 @@ impl Simulation {
             inverted_tets: standing.inverted_tets,
             frozen_particles: self.frozen,
             speed_max_m_s,
+            restoring: self.model.is_restoring(),
+            yielding_tools: self.tools.yielding(),
             asleep: false,
         };
         if self.calm_steps >= (CALM_S / self.solver.timestep_s).round() as u32 {

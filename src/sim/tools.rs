@@ -18,6 +18,12 @@ const TURNS: usize = 3;
 const SETTLED_SHARE: f32 = 0.01;
 /// Room round a tool for what its first push sets in motion, over its radius.
 const ROOM_RADII: f32 = 0.1;
+/// Tissue that is caught between two tools needs so much room, in edges of its tetrahedra: with less the
+/// second of the tools yields, until there is [`RETURN_EDGES`] again.
+const CAUGHT_EDGES: f32 = 0.25;
+const RETURN_EDGES: f32 = 0.35;
+/// Tools catch tissue between them if both push within this cosine towards the other.
+const CAUGHT_COSINE: f32 = 0.7;
 
 /// One tool.
 #[derive(Clone, Debug)]
@@ -37,6 +43,9 @@ struct Tool {
     let_go: bool,
     /// Whether it closes in this step.
     closes: bool,
+    /// Whether it leaves its place to another tool, as if it were idle: there is no room for the
+    /// tissue between the two.
+    yields: bool,
     contacts: Contacts,
     grab: Option<Grab>,
     /// Sum over the substeps of the force on the tool [N].
@@ -75,6 +84,7 @@ impl Tools {
         let left_out = self.tools.get(inputs.len()..).unwrap_or_default();
         self.gone = left_out.iter().any(Tool::acts);
         self.tools.truncate(inputs.len());
+        let mut pushed = Vec::with_capacity(inputs.len());
         for (index, &input) in inputs.iter().enumerate() {
             let input = sane(input, body);
             if index == self.tools.len() {
@@ -90,13 +100,16 @@ impl Tools {
                     still: false,
                     let_go: false,
                     closes: false,
+                    yields: false,
                     contacts: Contacts::default(),
                     grab: None,
                     force_sum_n: Vec3::ZERO,
                 });
             }
+            pushed.push(self.tools[index].contacts.multiplier());
             self.tools[index].take_over(input);
         }
+        self.find_room(&pushed, body.tissue.edge_m);
         // What a tool pushes or pulls may go as far as the tool.
         let fastest_m = self.tools.iter().map(Tool::way_m).fold(0.0, f32::max);
         body.way_m += 2.0 * fastest_m;
@@ -105,6 +118,49 @@ impl Tools {
                 tool.begin_step(body);
             }
         }
+    }
+
+    /// Finds the tools that yield to another, given what each `pushed` the body with in the last substep.
+    ///
+    /// Rigid tools give way to nothing. Two that press from both sides until nothing is left between
+    /// them ask for what no tissue can do: it would be torn, or the forces grow for ever.
+    fn find_room(&mut self, pushed: &[Vec3], edge_m: f32) {
+        for second in 0..self.tools.len() {
+            let mut yields = false;
+            for first in 0..second {
+                let (one, other) = (&self.tools[first], &self.tools[second]);
+                if one.yields || !(one.pushes() && other.pushes()) {
+                    continue;
+                }
+                let [one, two] = [one, other].map(|tool| (tool.input.shape, tool.input.position_m));
+                let (apart_m, towards) = contact::between(one, two);
+                let room_m = apart_m - one.0.radius_m() - two.0.radius_m();
+                yields |= if other.yields {
+                    room_m < RETURN_EDGES * edge_m
+                } else {
+                    let along = |pushed: Vec3| towards.dot(pushed.normalize_or_zero());
+                    let caught = along(pushed[first]) > CAUGHT_COSINE
+                        && along(pushed[second]) < -CAUGHT_COSINE;
+                    caught && room_m < CAUGHT_EDGES * edge_m
+                };
+            }
+            let tool = &mut self.tools[second];
+            tool.let_go |= yields != tool.yields;
+            tool.yields = yields;
+        }
+    }
+
+    /// Number of tools that yield to another.
+    pub fn yielding(&self) -> usize {
+        self.tools.iter().filter(|tool| tool.yields).count()
+    }
+
+    /// How far a tool that may touch the body goes between these shares of the step, at most, in its
+    /// radii.
+    pub fn way_radii(&self, (from, to): (f32, f32)) -> f32 {
+        let near = self.tools.iter().filter(|tool| tool.contacts.is_near());
+        near.map(|tool| (to - from) * tool.way_m() / tool.input.shape.radius_m())
+            .fold(0.0, f32::max)
     }
 
     /// Whether a tool that has changed touches or holds the body, or did so before, or comes to it on
@@ -318,7 +374,12 @@ impl Tool {
     fn begin_step(&mut self, body: Met) {
         let shape = self.input.shape;
         let places = &body.particles.places;
-        if self.input.action == ToolAction::Push {
+        if self.yields {
+            self.contacts.clear();
+            (self.behind_m, self.side_known) = (Vec3::ZERO, false);
+            return;
+        }
+        if self.pushes() {
             self.find_side(body);
             let ends = [self.from_m, self.to_m];
             let room_m = ROOM_RADII * shape.radius_m() + body.way_m;
@@ -367,7 +428,7 @@ impl Tool {
     }
 
     fn penetration_m(&self, surface: Surface, particles: &Particles) -> f32 {
-        if self.input.action != ToolAction::Push {
+        if self.yields || !self.pushes() {
             return 0.0;
         }
         let (shape, at_m) = (self.input.shape, self.input.position_m);
@@ -378,6 +439,10 @@ impl Tool {
             return shape.radius_m() + way.unwrap_or_default().length();
         }
         self.contacts.penetration_m(shape, at_m, surface.points)
+    }
+
+    fn pushes(&self) -> bool {
+        self.input.action == ToolAction::Push
     }
 
     /// Whether it touched or held the body in the last substep.

@@ -31,6 +31,26 @@ pub struct Grip {
     holds: Vec<Hold>,
     /// How many of them, from the first on, are of tools in the way; the others are places held.
     touches: usize,
+    /// How deep a place was in a tool in the last look, at most, in radii of the tool.
+    depth_radii: f64,
+}
+
+impl Span {
+    /// The same as far as a share of it, where tools are still on their way.
+    pub fn until(self, share: f32) -> Self {
+        let (from, to) = self.shares;
+        Self {
+            shares: (
+                from,
+                if share < 1.0 {
+                    from + share * (to - from)
+                } else {
+                    to
+                },
+            ),
+            ..self
+        }
+    }
 }
 
 impl Grip {
@@ -48,6 +68,11 @@ impl Grip {
         &self.holds[..self.touches]
     }
 
+    /// How deep a place was in a tool in the last look, at most, in radii of the tool.
+    pub fn depth_radii(&self) -> f64 {
+        self.depth_radii
+    }
+
     /// Looks what the tools do to the body if it ends the substep at `displacements`, which is also
     /// where `particles` are.
     pub fn look(
@@ -60,8 +85,11 @@ impl Grip {
         displacements: &[DVec4],
     ) {
         self.holds.clear();
+        self.depth_radii = 0.0;
         let per_h2 = 1.0 / f64::from(span.substep_s).powi(2);
         for touch in tools.look(particles, span.shares, span.substep_s) {
+            let depth_radii = f64::from(-touch.gap_m / touch.tool_radius_m);
+            self.depth_radii = self.depth_radii.max(depth_radii);
             let place = Place::new(&touch.handle, order);
             let stiffness = place.stiffness(body_stiffness);
             let s = place.displacement(displacements);

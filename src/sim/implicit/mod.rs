@@ -12,7 +12,8 @@
 //! A formula that looks two substeps back takes the blow of a tool for a motion that goes on: what was
 //! stopped at speed v it has rebound at v/2, and a light body on a tool hops for ever. So nodes that a
 //! tool is in the way of go by the backward Euler formula, u₁ = u₀ + h v₁, v₁ = v₀ + h a(u₁), and
-//! leave it with the past of a steady motion.
+//! leave it with the past of a steady motion. A body of which nothing is held goes so as a whole while a
+//! tool carries it: its weight would rebound else.
 //!
 //! Source: Hairer, Wanner, "Solving Ordinary Differential Equations II", 2nd ed., 1996, ch. V.1.
 
@@ -55,6 +56,14 @@ const ROUNDS: u32 = 4;
 /// Rounds that begin with a look at what the tools do, for each iteration. More than one Newton step
 /// between two looks would go to where the tools' tangents no longer hold, and fro.
 const LOOKS: u32 = 2;
+/// What goes farther than this share of a tool's radius against it in a substep has the tool come in
+/// pieces of that length, one a round: at once it would meet the tissue from too many sides.
+const PIECE_RADII: f32 = 0.5;
+/// Such pieces of a substep at most.
+const PIECES_MAX: u32 = 12;
+/// Looks that are added while a place is deeper in a tool than [`DEEP_RADII`] of its radius, at most.
+const MORE_LOOKS: u32 = 12;
+const DEEP_RADII: f64 = 0.01;
 /// Forces beyond so many times the weight come from no motion that a past could be made up for.
 const SMOOTH_WEIGHTS: f64 = 2.0;
 
@@ -102,6 +111,8 @@ pub struct Implicit {
     elastic_j: Option<f64>,
     /// Residual over load after the last substep.
     residual_share: f64,
+    /// Whether the body was wrecked in the last substep and led back.
+    restoring: bool,
 }
 
 impl Implicit {
@@ -148,6 +159,7 @@ impl Implicit {
             sound: vec![DVec4::ZERO; count + 1],
             elastic_j: None,
             residual_share: 0.0,
+            restoring: false,
             rest,
             order,
         }
@@ -156,6 +168,11 @@ impl Implicit {
     /// What is left of the forces after the last substep, over the forces that move the body.
     pub fn residual_share(&self) -> f32 {
         self.residual_share as f32
+    }
+
+    /// Whether the body was wrecked in the last substep and led back.
+    pub fn is_restoring(&self) -> bool {
+        self.restoring
     }
 
     /// Forgets the past: the body was put where it is.
@@ -210,6 +227,7 @@ impl Implicit {
             let start = self.start(step);
             start.map(|start| self.descend(start, step))
         };
+        self.restoring = end.is_none();
         let Some(end) = end else {
             self.restore(particles, step);
             self.publish(particles);
@@ -260,23 +278,34 @@ impl Implicit {
         tools.resume(step.substep_s);
         self.newton.begin_step();
         let mut state = None;
-        let looks = LOOKS * step.iterations;
+        let pieces = tools.way_radii(step.shares) / PIECE_RADII;
+        let pieces = pieces.clamp(1.0, PIECES_MAX as f32).ceil() as u32;
+        // The last piece is the tool where it ends: the looks of a slow one come from there on.
+        let mut looks = pieces - 1 + LOOKS * step.iterations;
+        let looks_max = looks + MORE_LOOKS;
+        let mut rounds = pieces - 1 + ROUNDS + ROUNDS * step.iterations;
         let once = Step {
             iterations: 1,
             ..step
         };
-        for round in 0..ROUNDS + ROUNDS * step.iterations {
+        let mut round = 0;
+        while round < rounds {
             if round < looks {
                 self.show(particles);
                 self.goal.grip.look(
                     tools,
                     particles,
-                    span,
+                    span.until((round + 1).min(pieces) as f32 / pieces as f32),
                     &self.order,
                     (self.newton).body_stiffness(&self.now, &self.goal, step.lame),
                     &self.next,
                 );
                 self.take_blows(step);
+                let is_deep = self.goal.grip.depth_radii() > DEEP_RADII;
+                if is_deep && round + 1 == looks && looks < looks_max {
+                    looks += 1;
+                    rounds += 1;
+                }
             }
             let start = if round == 0 {
                 self.start(step)?
@@ -285,7 +314,8 @@ impl Implicit {
             };
             state = Some(self.descend(start, once));
             let settled = self.goal.grip.settle(tools, span, &self.next);
-            if settled && round + 1 >= looks {
+            round += 1;
+            if settled && round >= looks {
                 break;
             }
         }
@@ -293,20 +323,25 @@ impl Implicit {
         state
     }
 
-    /// Has the nodes that tools are in the way of go by the backward Euler formula.
+    /// Has the nodes that tools are in the way of go by the backward Euler formula; all of them, where
+    /// nothing else carries the body.
     fn take_blows(&mut self, step: Step) {
+        let touches = self.goal.grip.touches();
+        let carriers = touches.iter().flat_map(|hold| &hold.place.carriers);
+        let mut nodes: Vec<usize> = carriers.map(|&(node, _)| node as usize).collect();
+        let is_held = self.order.free < self.rest.len();
+        if !(nodes.is_empty() || is_held) {
+            nodes = (0..self.order.free).collect();
+        }
         let h = f64::from(step.substep_s);
         let gravity = step.gravity_m_s2.as_dvec3().extend(0.0);
         let damped = 1.0 + f64::from(step.damping_per_s) * h;
-        for hold in self.goal.grip.touches() {
-            for &(node, _) in &hold.place.carriers {
-                let node = node as usize;
-                let is_free = node < self.order.free && self.velocities_before[node].is_finite();
-                if is_free && !std::mem::replace(&mut self.touched[node], true) {
-                    self.goal.inertia[node] = self.masses_kg[node] * damped / (h * h);
-                    self.goal.free[node] =
-                        self.now[node] + h / damped * (self.velocities_before[node] + h * gravity);
-                }
+        for node in nodes {
+            let is_free = node < self.order.free && self.velocities_before[node].is_finite();
+            if is_free && !std::mem::replace(&mut self.touched[node], true) {
+                self.goal.inertia[node] = self.masses_kg[node] * damped / (h * h);
+                self.goal.free[node] =
+                    self.now[node] + h / damped * (self.velocities_before[node] + h * gravity);
             }
         }
     }

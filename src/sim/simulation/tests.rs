@@ -2,6 +2,7 @@
 
 mod contact;
 mod grab;
+mod hard_pressed;
 mod hertz;
 mod implicit;
 mod pokes;
