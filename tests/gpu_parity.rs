@@ -13,15 +13,10 @@ use glam::{DVec3, Vec2, Vec3, Vec4};
 use gpu_body::{GpuBody, RADIUS_M, gpu, percentile, sabotaged, surfaces, worst};
 use palpate::geom::SurfaceMesh;
 use palpate::geom::moments::{PatchSums, RunningPlanes};
-use palpate::geom::patch::Patches;
 use palpate::geom::plane::{LightPathMethod, Plane, carried_plane, exact_plane, fit_planes};
-use palpate::geom::tangent::{
-    Fans, TangentFrame, exact_normals, gradient_max_per_m, point_normals, rest_normals,
-    tangent_frames,
-};
-use palpate::gpu::{Gpu, Timer, join, read_buffer};
-use palpate::passes::light_path::{LightPath, LightPathKnobs, RefitCounts};
-use palpate::passes::mesh_buffers::MeshBuffers;
+use palpate::geom::tangent::{TangentFrame, exact_normals, gradient_max_per_m, tangent_frames};
+use palpate::gpu::{Gpu, join, read_buffer};
+use palpate::passes::light_path::RefitCounts;
 use palpate::passes::plane_carried::{PlaneCarried, planes_in_frames};
 use palpate::passes::plane_full::PlaneFull;
 use palpate::passes::plane_incremental::PlaneIncremental;

@@ -12,19 +12,16 @@ mod surfaces;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use gpu_body::{GpuBody, RADIUS_M, gpu, percentile, sabotaged, surfaces, worst};
 use palpate::geom::SurfaceMesh;
-use palpate::geom::patch::{LEAF_SLOTS, Patches};
+use palpate::geom::patch::LEAF_SLOTS;
 use palpate::geom::plane::{
     LightPathMethod, Plane, exact_weighted_plane, fit_sampled_plane, fit_sampled_planes,
 };
 use palpate::geom::quadric::{Quadric, exact_quadric, fit_quadric, fit_quadrics};
 use palpate::geom::sample::{MovedLeaves as MovedTwin, Samples, slots_of_leaf};
-use palpate::geom::tangent::{Fans, point_normals, rest_normals};
-use palpate::gpu::{Gpu, Timer, join, read_buffer};
-use palpate::passes::light_path::{LightPath, LightPathKnobs, Primitives, RefitCounts};
-use palpate::passes::mesh_buffers::MeshBuffers;
+use palpate::gpu::{Gpu, join, read_buffer};
+use palpate::passes::light_path::{LightPath, Primitives, RefitCounts};
 use palpate::passes::moved_leaves::{MovedLeaves, SampledPatches};
 use palpate::passes::sampled_fit::{Fit, SampledFit};
-use palpate::passes::tangents::Tangents;
 use std::ops::Deref;
 use surfaces::{deformed, sphere, wavy};
 
