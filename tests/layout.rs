@@ -12,8 +12,7 @@ use palpate::passes::moved_leaves::{self, ListedParams, MovedLeaves};
 use palpate::passes::plane_carried::{self, PlaneCarried};
 use palpate::passes::plane_full::{self, PlaneFull};
 use palpate::passes::plane_incremental::{MovedParams, PlaneIncremental, UpdateParams};
-use palpate::passes::plane_sampled::PlaneSampled;
-use palpate::passes::quadric::Quadrics;
+use palpate::passes::sampled_fit::Fit;
 use palpate::passes::shadow::Shadow;
 use palpate::passes::surface::Surface;
 use palpate::passes::tangents::{NormalsParams, Tangents, TangentsParams};
@@ -35,8 +34,8 @@ fn shaders() -> Vec<(&'static str, &'static [Wgsl])> {
         ("incremental planes, moved", PlaneIncremental::MOVED_WGSL),
         ("incremental planes, update", PlaneIncremental::UPDATE_WGSL),
         ("moved leaves", MovedLeaves::WGSL),
-        ("sampled planes", PlaneSampled::WGSL),
-        ("quadrics", Quadrics::WGSL),
+        ("sampled planes", Fit::Plane.wgsl()),
+        ("quadrics", Fit::Quadric.wgsl()),
         ("geometry", Geometry::WGSL),
         ("shadow", Shadow::WGSL),
         ("light map", LightMap::WGSL),
@@ -169,8 +168,8 @@ fn mirrors() -> Vec<Mirror> {
                 pad1
             }
         ),
-        listed(PlaneSampled::WGSL),
-        listed(Quadrics::WGSL),
+        listed(Fit::Plane.wgsl()),
+        listed(Fit::Quadric.wgsl()),
         mirror!(
             Surface::wgsl(SurfaceKind::Subsurface, CoverKind::DepthMaps),
             "LightViews",

@@ -3,25 +3,26 @@
 //!
 //! A missing adapter is a failure, not a skip: a software one (mesa-vulkan-drivers) will do.
 
+#[allow(dead_code)] // Other tests use the rest.
+#[path = "support/gpu_body.rs"]
+mod gpu_body;
 #[path = "support/surfaces.rs"]
 mod surfaces;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
+use gpu_body::{GpuBody, RADIUS_M, gpu, percentile, sabotaged, surfaces, worst};
 use palpate::geom::SurfaceMesh;
-use palpate::geom::patch::{LEAF_SLOTS, Patches};
+use palpate::geom::patch::LEAF_SLOTS;
 use palpate::geom::plane::{
     LightPathMethod, Plane, exact_weighted_plane, fit_sampled_plane, fit_sampled_planes,
 };
 use palpate::geom::quadric::{Quadric, exact_quadric, fit_quadric, fit_quadrics};
 use palpate::geom::sample::{MovedLeaves as MovedTwin, Samples, slots_of_leaf};
-use palpate::geom::tangent::{Fans, point_normals, rest_normals};
-use palpate::gpu::{Gpu, Timer, join, read_buffer};
-use palpate::passes::light_path::{LightPath, LightPathKnobs, Primitives, RefitCounts};
-use palpate::passes::mesh_buffers::MeshBuffers;
+use palpate::gpu::{Gpu, join, read_buffer};
+use palpate::passes::light_path::{LightPath, Primitives, RefitCounts};
 use palpate::passes::moved_leaves::{MovedLeaves, SampledPatches};
-use palpate::passes::plane_sampled::PlaneSampled;
-use palpate::passes::quadric::Quadrics;
-use palpate::passes::tangents::Tangents;
+use palpate::passes::sampled_fit::{Fit, SampledFit};
+use std::ops::Deref;
 use surfaces::{deformed, sphere, wavy};
 
 /// A plane's normal turns by rounding over the gap between two eigenvalues: 3e-6 was the worst seen.
@@ -30,78 +31,35 @@ const PLANE_TOLERANCE: f32 = 1e-4;
 const QUADRIC_TOLERANCE: f32 = 5e-4;
 /// What is asked against f64, at the 99.9th percentile.
 const ORACLE_DEGREES: f64 = 0.05;
-/// Reach of a patch on the test surfaces: 2 to 60 members, by the surface's fineness.
-const RADIUS_M: f32 = 0.012;
 
-fn gpu() -> Gpu {
-    Gpu::headless().expect("a GPU adapter; a software one (mesa-vulkan-drivers) will do")
-}
-
-/// Sizes below, at and above a leaf and a workgroup, and one surface with a seam and poles.
-fn surfaces() -> Vec<(String, SurfaceMesh)> {
-    let mut all: Vec<_> = [2, 3, 17, 64]
-        .map(|side| (format!("{side} x {side} points"), wavy(side)))
-        .into();
-    all.push(("a sphere".to_owned(), sphere(0.04, 40, 21)));
-    all
-}
-
-/// A surface on the GPU, and what the twins need to know of it.
+/// A surface on the GPU with the samples of its patches.
 struct Body {
-    mesh: SurfaceMesh,
-    buffers: MeshBuffers,
-    tangents: Tangents,
-    fans: Fans,
-    rest_normals: Vec<Vec3>,
+    on_gpu: GpuBody,
     samples: Samples,
     /// The same, weighted to the middle.
     middle: Samples,
     dependents: Vec<Vec<u32>>,
 }
 
+impl Deref for Body {
+    type Target = GpuBody;
+
+    fn deref(&self) -> &GpuBody {
+        &self.on_gpu
+    }
+}
+
 impl Body {
     fn new(gpu: &Gpu, mesh: SurfaceMesh) -> Self {
-        let buffers = MeshBuffers::new(gpu, &mesh).expect("the surface fits");
-        let tangents = Tangents::new(gpu, &mesh, &buffers).expect("the pass is built");
-        let fans = Fans::new(&mesh);
-        let rest_normals = rest_normals(&mesh, &fans);
-        let patches = Patches::new(&mesh.points, &rest_normals, RADIUS_M);
-        let samples = Samples::new(&mesh.points, &patches);
+        let on_gpu = GpuBody::new(gpu, mesh);
+        let mesh = &on_gpu.mesh;
+        let samples = Samples::new(&mesh.points, &on_gpu.patches);
         Self {
-            buffers,
-            tangents,
-            fans,
-            rest_normals,
             middle: samples.clone().weighted_to_the_middle(&mesh.points),
             dependents: samples.dependents(&mesh.point_triangles()),
             samples,
-            mesh,
+            on_gpu,
         }
-    }
-
-    fn frame(
-        &self,
-        gpu: &Gpu,
-        points: &[Vec3],
-        record: impl FnOnce(&mut wgpu::CommandEncoder, &mut Timer),
-    ) {
-        self.buffers.upload(gpu, points);
-        let mut timer = Timer::new(gpu, 4);
-        let mut encoder = gpu.encoder();
-        self.tangents.record(&mut encoder, &mut timer);
-        record(&mut encoder, &mut timer);
-        gpu.queue.submit([encoder.finish()]);
-    }
-
-    fn light_path(&self, gpu: &Gpu, method: LightPathMethod, tolerance_m: f32) -> LightPath {
-        let knobs = LightPathKnobs {
-            method,
-            radius_m: RADIUS_M,
-            tolerance_m,
-            skip_m: 0.0,
-        };
-        LightPath::new(gpu, knobs, &self.mesh, &self.buffers, &self.tangents)
-            .expect("the pass is built")
     }
 
     fn patches<'a>(
@@ -117,15 +75,6 @@ impl Body {
             tolerance_m,
             skip_m,
         }
-    }
-
-    fn twin_normals(&self, points: &[Vec3]) -> Vec<Vec3> {
-        point_normals(&self.fans, points, &self.rest_normals)
-    }
-
-    fn normals(&self, gpu: &Gpu) -> Vec<Vec3> {
-        let normals: Vec<Vec4> = read_buffer(gpu, &self.tangents.normals).expect("can be read");
-        normals.iter().map(|n| n.truncate()).collect()
     }
 }
 
@@ -149,28 +98,6 @@ fn read_quadrics(gpu: &Gpu, buffer: &wgpu::Buffer) -> Vec<Quadric> {
             products: products.truncate(),
         })
         .collect()
-}
-
-/// Not a number counts as infinitely far.
-fn worst(differences: impl Iterator<Item = f32>) -> f32 {
-    differences.fold(0.0, |worst, d| {
-        if d.is_nan() {
-            f32::INFINITY
-        } else {
-            worst.max(d)
-        }
-    })
-}
-
-fn percentile(mut values: Vec<f64>, share: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[((values.len() - 1) as f64 * share).round() as usize]
-}
-
-fn sabotaged(source: &str, from: &str, to: &str) -> String {
-    let changed = source.replace(from, to);
-    assert_ne!(changed, source, "the sabotage must change the kernel");
-    changed
 }
 
 fn plane_difference(a: &Plane, b: &Plane) -> f32 {
@@ -233,8 +160,9 @@ impl Run<'_> {
     fn planes(&self) -> (f32, bool) {
         let (gpu, body, samples) = (self.gpu, self.body, &self.body.samples);
         let rest = &body.mesh.points;
-        let pass = PlaneSampled::with_sources(
+        let pass = SampledFit::with_sources(
             gpu,
+            Fit::Plane,
             [rest, &body.rest_normals],
             &body.patches(samples, self.tolerance_m, self.skip_m),
             &body.buffers,
@@ -260,7 +188,7 @@ impl Run<'_> {
             }
             let counts = pass.leaves.counts(gpu).expect("counts can be read");
             same &= (counts.moved, counts.refitted) == (found.moved, found.refitted);
-            let planes = read_planes(gpu, &pass.planes);
+            let planes = read_planes(gpu, &pass.primitives);
             let apart = planes
                 .iter()
                 .zip(&twin)
@@ -275,8 +203,9 @@ impl Run<'_> {
         let (gpu, body, samples) = (self.gpu, self.body, &self.body.middle);
         let rest = &body.mesh.points;
         let per_m = 1.0 / RADIUS_M;
-        let pass = Quadrics::with_sources(
+        let pass = SampledFit::with_sources(
             gpu,
+            Fit::Quadric,
             [rest, &body.rest_normals],
             &body.patches(samples, self.tolerance_m, self.skip_m),
             &body.buffers,
@@ -302,7 +231,7 @@ impl Run<'_> {
             }
             let counts = pass.leaves.counts(gpu).expect("counts can be read");
             same &= (counts.moved, counts.refitted) == (found.moved, found.refitted);
-            let quadrics = read_quadrics(gpu, &pass.quadrics);
+            let quadrics = read_quadrics(gpu, &pass.primitives);
             let apart = quadrics
                 .iter()
                 .zip(&twin)
@@ -314,17 +243,17 @@ impl Run<'_> {
 }
 
 fn plane_sources() -> [String; 2] {
-    [MovedLeaves::WGSL, PlaneSampled::WGSL].map(join)
+    [MovedLeaves::WGSL, Fit::Plane.wgsl()].map(join)
 }
 
 fn quadric_sources() -> [String; 2] {
-    [MovedLeaves::WGSL, Quadrics::WGSL].map(join)
+    [MovedLeaves::WGSL, Fit::Quadric.wgsl()].map(join)
 }
 
 #[test]
 fn sampled_planes_match_the_cpu_twin() {
     let gpu = gpu();
-    for (name, mesh) in surfaces() {
+    for (name, mesh) in surfaces(&[2, 3, 17, 64]) {
         let body = Body::new(&gpu, mesh);
         let run = Run {
             gpu: &gpu,
@@ -352,8 +281,9 @@ fn skipped(gpu: &Gpu, source: &str) -> (f64, f64) {
     let body = Body::new(gpu, wavy(64));
     let points = deformed(&body.mesh.points);
     let sources = [join(MovedLeaves::WGSL), source.to_owned()];
-    let pass = PlaneSampled::with_sources(
+    let pass = SampledFit::with_sources(
         gpu,
+        Fit::Plane,
         [&body.mesh.points, &body.rest_normals],
         &body.patches(&body.samples, 0.0, SKIP_M),
         &body.buffers,
@@ -362,7 +292,7 @@ fn skipped(gpu: &Gpu, source: &str) -> (f64, f64) {
     )
     .expect("the pass is built");
     body.frame(gpu, &points, |encoder, timer| pass.record(encoder, timer));
-    let planes = read_planes(gpu, &pass.planes);
+    let planes = read_planes(gpu, &pass.primitives);
     let normals = body.normals(gpu);
     let twin = fit_sampled_planes(&points, &normals, &body.samples, SKIP_M);
     let share = |count: usize| count as f64 / points.len() as f64;
@@ -380,7 +310,7 @@ fn skipped(gpu: &Gpu, source: &str) -> (f64, f64) {
 
 #[test]
 fn flat_patches_take_no_fit_where_a_scene_asks_and_the_same_ones_as_the_twin() {
-    let (flat, apart) = skipped(&gpu(), &join(PlaneSampled::WGSL));
+    let (flat, apart) = skipped(&gpu(), &join(Fit::Plane.wgsl()));
     assert!((0.03..0.9).contains(&flat), "{flat} took no fit");
     assert!(apart < 0.002, "{apart} differ");
 }
@@ -395,7 +325,7 @@ fn skip_parity_check_rejects_a_rule_without_the_lean_and_one_that_is_off() {
             "if false && is_flat(mean, spread, normal)",
         ),
     ] {
-        let source = sabotaged(&join(PlaneSampled::WGSL), from, to);
+        let source = sabotaged(&join(Fit::Plane.wgsl()), from, to);
         let (_, apart) = skipped(&gpu, &source);
         assert!(apart > 0.01, "{to} went unnoticed: {apart}");
     }
@@ -404,7 +334,7 @@ fn skip_parity_check_rejects_a_rule_without_the_lean_and_one_that_is_off() {
 #[test]
 fn quadrics_match_the_cpu_twin() {
     let gpu = gpu();
-    for (name, mesh) in surfaces() {
+    for (name, mesh) in surfaces(&[2, 3, 17, 64]) {
         let body = Body::new(&gpu, mesh);
         let run = Run {
             gpu: &gpu,

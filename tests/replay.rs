@@ -23,13 +23,16 @@ const DEGREES_MAX: f64 = 0.05;
 /// The probe has touched the liver after 30 frames and presses it still deeper.
 const PRESSED: u32 = 44;
 
-/// The default scene, pressed by its probe, with a sample of the states in the last frame.
+/// The default scene with planes, pressed by its probe, with a sample of the states in the last frame.
 fn pressed_liver() -> &'static Run {
     static RUN: OnceLock<Run> = OnceLock::new();
     RUN.get_or_init(|| {
         Run::new(
             "replay-liver",
-            &format!("liver --size 160x120 --frames {PRESSED} --png 20 --dump 0 --dump {PRESSED}"),
+            &format!(
+                "liver --size 160x120 --frames {PRESSED} --png 20 --dump 0 --dump {PRESSED} \
+                 --set light_path.method=incremental"
+            ),
         )
     })
 }

@@ -433,10 +433,7 @@ fn entry_parity_check_rejects_a_cut_across_the_light_and_a_lost_slack() {
     let gpu = gpu();
     let source = join(wgsl!["light_entry.wgsl"]);
     for (from, to) in [
-        (
-            "dot(entry - at, normal) / cosine",
-            "dot(entry - at, to_light)",
-        ),
+        ("dot(way - along * to_light, normal) / cosine", "0.0"),
         ("s > -slack_m", "s > 0.0"),
     ] {
         assert!(

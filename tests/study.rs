@@ -344,9 +344,17 @@ fn study_of_light_paths_writes_the_rows_that_scripts_read() {
     let error = |row: usize| rows[row]["radiance_error_rel"].as_f64().expect("a number");
     // Stale at rest, stale and full in a twist.
     assert!(error(0) < error(1) && error(3) < error(1));
+    // Parts write no picture of their own; it is made where they are joined.
+    let joined = folder("study-planes-joined");
+    let [from, to] = [&out, &joined].map(|folder| folder.display().to_string());
+    let merge = palpate(&["study", "merge", &to, &from]).output();
+    succeeded(&merge.expect("it runs"));
     for name in ["planes.csv", "planes.svg", "planes.png", "report.html"] {
         assert!(out.join(name).is_file(), "{name}");
+        assert!(joined.join(name).is_file(), "{name}");
     }
+    let picture = |folder: &Path| std::fs::read(folder.join("planes.png")).expect("it was written");
+    assert_eq!(picture(&out), picture(&joined));
     refused(
         &palpate(&["study", "planes", "--set", "light_path.radius_share=0.9"])
             .output()

@@ -5,6 +5,7 @@
 
 use super::hand::HandKnobs;
 use super::history::History;
+use super::light_error::ErrorMap;
 use super::{Session, assets};
 use crate::geom::plane::LightPathMethod;
 use crate::scene::SurfaceKind;
@@ -33,6 +34,8 @@ pub struct PanelState {
     pub panel_open: bool,
     /// Whether the list of keys is shown.
     pub help_open: bool,
+    /// Whether the error of the light path is laid over the picture.
+    pub light_error_shown: bool,
     /// Something changed that is not on the screen yet.
     pub wants_frame: bool,
     /// The body sleeps.
@@ -80,6 +83,7 @@ impl PanelState {
             screenshot: false,
             panel_open: true,
             help_open: false,
+            light_error_shown: false,
             wants_frame: true,
             asleep: false,
             frozen_particles: 0,
@@ -89,13 +93,22 @@ impl PanelState {
     }
 }
 
+/// What the panel draws and the window holds.
+#[derive(Clone, Copy)]
+pub struct Shown<'a> {
+    /// The finished picture of the scene.
+    pub picture: egui::TextureId,
+    /// The error of its light path, as a picture, where it is known.
+    pub error: Option<(egui::TextureId, &'a ErrorMap)>,
+}
+
 /// Draws panel and picture; returns where the picture is, in points.
 pub fn show(
     ui: &mut Ui,
     state: &mut PanelState,
     session: &mut Session,
     history: &History,
-    picture: egui::TextureId,
+    shown: Shown<'_>,
     asks: &mut Vec<PanelAsk>,
 ) -> egui::Rect {
     if state.panel_open {
@@ -107,7 +120,7 @@ pub fn show(
                     run_section(ui, state, session, asks);
                     readings(ui, state, session, history);
                     surface_section(ui, session, asks);
-                    light_path_section(ui, session, asks);
+                    light_path_section(ui, state, session, shown.error, asks);
                     solver_section(ui, session, asks);
                     hand_section(ui, state, session);
                 });
@@ -116,7 +129,10 @@ pub fn show(
     let view = egui::CentralPanel::no_frame()
         .show(ui, |ui| {
             let rect = ui.available_rect_before_wrap();
-            egui::Image::new((picture, rect.size())).paint_at(ui, rect);
+            egui::Image::new((shown.picture, rect.size())).paint_at(ui, rect);
+            if state.light_error_shown {
+                super::heat::paint(ui, rect, session, shown.error);
+            }
             rect
         })
         .inner;
@@ -336,7 +352,13 @@ fn surface_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAsk>)
     asks.extend(change);
 }
 
-fn light_path_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAsk>) {
+fn light_path_section(
+    ui: &mut Ui,
+    state: &mut PanelState,
+    session: &mut Session,
+    error: Option<(egui::TextureId, &ErrorMap)>,
+    asks: &mut Vec<PanelAsk>,
+) {
     if session.scene.surface.kind != SurfaceKind::Subsurface {
         return;
     }
@@ -359,6 +381,12 @@ fn light_path_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAs
         if ui.add(slider).drag_stopped() {
             asks.push(PanelAsk::Rebuild);
         }
+    }
+    ui.checkbox(&mut state.light_error_shown, "error against cast rays (E)");
+    if let Some(error_rel) = error.and_then(|(_, map)| map.error_rel)
+        && state.light_error_shown
+    {
+        ui.label(format!("radiance {:.1} % off", 100.0 * error_rel));
     }
 }
 
@@ -437,6 +465,7 @@ fn help(ui: &Ui, state: &mut PanelState) {
                     ("R", "reset to rest"),
                     ("P", "play the scene's script"),
                     ("C", "back to the scene's camera"),
+                    ("E", "error of the light path against cast rays"),
                     ("S or F12", "save a picture"),
                     ("O", "record the mouse from rest; again: stop and save"),
                     ("K", "save the scene as it is"),

@@ -1,16 +1,18 @@
 //! A session drawn: the passes of its scene, their times, and what can be read back.
 
+use super::light_error::Snapshot;
 use super::orbit::Orbit;
 use super::{AppError, Session, load};
 use crate::geom::paint::TissueMaps;
 use crate::gpu::{
     Gpu, PassTime, Timer, read_buffer, read_texture_depth, read_texture_rgba8, read_texture_rgba16f,
 };
-use crate::passes::frame::FramePasses;
+use crate::passes::frame::{FramePasses, effective_method, light_radius_m};
 use crate::passes::light_path::{Primitives, RefitCounts};
 use crate::passes::tools::DrawnTool;
 use crate::passes::view::View;
 use crate::scene::Scene;
+use crate::study::planes::{Drawn, DrawnPrimitives, read_depth_maps};
 use glam::Vec3;
 use image::RgbaImage;
 use std::sync::Arc;
@@ -186,6 +188,43 @@ impl Renderer {
             &self.gpu,
             &self.passes.targets.depth.texture,
         )?)
+    }
+
+    /// What the light path's error is asked of, with the surface at `points` [m], where it was last drawn; `None` for a
+    /// surface that follows no light below it.
+    ///
+    /// # Errors
+    ///
+    /// [`AppError::Gpu`] if the primitives can't be read back.
+    pub fn snapshot(&self, session: &Session, orbit: &Orbit) -> Result<Option<Snapshot>, AppError> {
+        if effective_method(&session.scene).is_none() {
+            return Ok(None);
+        }
+        let (gpu, lights) = (&self.gpu, self.passes.lights());
+        let points = session.points();
+        let primitives = match self.passes.light_path.primitives() {
+            Primitives::Tangent => DrawnPrimitives::Tangent,
+            Primitives::Planes(buffer) => DrawnPrimitives::Planes(read_buffer(gpu, buffer)?),
+            Primitives::Quadrics(buffer) => DrawnPrimitives::Quadrics(read_buffer(gpu, buffer)?),
+            Primitives::DepthMaps => {
+                let pass = self.passes.depth_maps().expect("the method draws them");
+                let maps = read_depth_maps(gpu, pass, lights, points)?;
+                DrawnPrimitives::DepthMaps(maps.into_iter().map(|map| vec![map]).collect())
+            }
+        };
+        Ok(Some(Snapshot {
+            points: points.to_vec(),
+            triangles: session.mesh.point_triangles(),
+            drawn: Drawn {
+                normals: read_buffer(gpu, &self.passes.tangents.normals)?,
+                primitives,
+            },
+            lights: lights.to_vec(),
+            radius_m: light_radius_m(&session.scene),
+            orbit: *orbit,
+            size: self.size(),
+            time_s: session.time_s(),
+        }))
     }
 
     /// Normals a point, tangents a vertex, primitives a point (none for the tangent plane).

@@ -1,7 +1,9 @@
 //! The window: winit events in, frames out. Everything that is computed lives in the session.
 
 use super::hand::{Hand, HandKnobs};
+use super::heat;
 use super::history::{History, Sample};
+use super::light_error::LightError;
 use super::load;
 use super::orbit::{Orbit, Ray};
 use super::panel::{self, PanelAsk, PanelState};
@@ -133,6 +135,9 @@ struct Shown {
     drag: Drag,
     state: PanelState,
     history: History,
+    light_error: LightError,
+    /// The map of it, once there is one.
+    light_error_picture: Option<egui::TextureHandle>,
     /// Every frame since the window opened, for the log.
     recording: Recording,
     /// What the hand does, while it is recorded.
@@ -193,7 +198,7 @@ impl ApplicationHandler for App {
     }
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
-        if let Some(shown) = &self.shown {
+        if let Some(shown) = &mut self.shown {
             if shown.idle() {
                 // Asleep: look again a few times a second, in case a knob was turned by a script.
                 event_loop.set_control_flow(ControlFlow::WaitUntil(
@@ -292,6 +297,8 @@ impl Shown {
             drag: Drag::Nothing,
             state,
             history: History::default(),
+            light_error: LightError::default(),
+            light_error_picture: None,
             recording: Recording::new(scene_name.to_owned(), threads),
             take: None,
             threads,
@@ -305,8 +312,11 @@ impl Shown {
     }
 
     /// Nothing moves and nobody does anything.
-    fn idle(&self) -> bool {
-        self.state.asleep && self.drag == Drag::Nothing && !self.state.wants_frame
+    fn idle(&mut self) -> bool {
+        self.state.asleep
+            && self.drag == Drag::Nothing
+            && !self.state.wants_frame
+            && !self.light_error.has_news()
     }
 
     fn resize(&mut self, size: PhysicalSize<u32>) {
@@ -434,6 +444,7 @@ impl Shown {
             KeyCode::KeyC => self.reset_camera(),
             KeyCode::KeyO => self.record_or_stop(),
             KeyCode::KeyK => self.save_scene(),
+            KeyCode::KeyE => self.state.light_error_shown = !self.state.light_error_shown,
             KeyCode::Escape => self.wants_to_close = true,
             KeyCode::KeyQ if self.control_held => self.wants_to_close = true,
             KeyCode::Tab => self.state.panel_open = !self.state.panel_open,
@@ -549,6 +560,7 @@ impl Shown {
             last_tick = Some(tick);
         }
 
+        self.take_light_error();
         let (jobs, pixels_per_point) = self.panel()?;
         let tools = self.session.visible_tools();
         let drawn = self
@@ -559,6 +571,7 @@ impl Shown {
             self.history.push(sample);
             self.recording.add(&self.session, start, &tick, drawn);
         }
+        self.ask_light_error()?;
         if std::mem::take(&mut self.state.screenshot) {
             self.screenshot()?;
         }
@@ -573,6 +586,14 @@ impl Shown {
     fn panel(&mut self) -> Result<(Vec<egui::ClippedPrimitive>, f32), AppError> {
         let input = self.egui.take_egui_input(&self.window);
         let context = self.egui.egui_ctx().clone();
+        let error = self
+            .light_error_picture
+            .as_ref()
+            .zip(self.light_error.map());
+        let shown = panel::Shown {
+            picture: self.picture,
+            error: error.map(|(picture, map)| (picture.id(), map)),
+        };
         let mut asks = Vec::new();
         let mut view = egui::Rect::ZERO;
         let output = context.run_ui(input, |ui| {
@@ -581,7 +602,7 @@ impl Shown {
                 &mut self.state,
                 &mut self.session,
                 &self.history,
-                self.picture,
+                shown,
                 &mut asks,
             );
         });
@@ -700,13 +721,48 @@ impl Shown {
         self.state.scene_name = name.to_owned();
         self.history = History::default();
         (self.take, self.state.records) = (None, false);
+        self.light_error.forget();
         self.show_new_picture();
         Ok(())
     }
 
     fn rebuild(&mut self) -> Result<(), AppError> {
         self.renderer = self.renderer.rebuilt(&self.session)?;
+        self.light_error.forget();
         self.show_new_picture();
+        Ok(())
+    }
+
+    /// Shows the error of the light path that has come in; forgets it when it is switched off or the camera has moved.
+    fn take_light_error(&mut self) {
+        let came = self.light_error.take_news();
+        let map = self.light_error.map();
+        if !self.state.light_error_shown || map.is_some_and(|map| map.orbit != self.orbit) {
+            self.light_error.clear();
+            self.light_error_picture = None;
+        } else if came && let Some(map) = map {
+            let picture = heat::picture(map);
+            let options = egui::TextureOptions::NEAREST;
+            let context = self.egui.egui_ctx();
+            self.light_error_picture = Some(context.load_texture("light error", picture, options));
+            self.state.wants_frame = true;
+        }
+    }
+
+    /// Has the frame that was just drawn compared with cast rays, if that is shown, nothing else is being compared
+    /// and it differs from what is shown.
+    fn ask_light_error(&mut self) -> Result<(), AppError> {
+        if !self.state.light_error_shown || !self.light_error.is_free() {
+            return Ok(());
+        }
+        let time_s = self.session.time_s();
+        let is_known = self
+            .light_error
+            .map()
+            .is_some_and(|map| map.time_s == time_s);
+        if !is_known && let Some(snapshot) = self.renderer.snapshot(&self.session, &self.orbit)? {
+            self.light_error.ask(snapshot, self.threads);
+        }
         Ok(())
     }
 

@@ -43,6 +43,8 @@ pub struct Point {
     pub y: Option<f64>,
     /// Written beside it where there is room.
     pub label: String,
+    /// Width of its marker, as a multiple of the common one.
+    pub scale: f64,
 }
 
 /// Points over two logarithmic axes.
@@ -101,7 +103,7 @@ impl ScatterChart {
             .clouds
             .iter()
             .filter(|cloud| !cloud.label.is_empty())
-            .map(|cloud| (marker(cloud, (0.0, 0.0)), cloud.label.clone()))
+            .map(|cloud| (marker(cloud, (0.0, 0.0), 1.0), cloud.label.clone()))
             .collect();
         if self.has_failed() {
             let beyond = number(self.y_range.1);
@@ -272,7 +274,7 @@ impl Frame {
             if self.fails(point) {
                 svg += &cross(place, color(cloud));
             } else {
-                svg += &marker(cloud, place);
+                svg += &marker(cloud, place, point.scale);
             }
         }
         svg
@@ -350,8 +352,8 @@ fn color(cloud: &Cloud) -> &'static str {
 }
 
 /// A marker: shapes differ as well as colours, for print and for colour-blind readers.
-fn marker(cloud: &Cloud, (x, y): (f64, f64)) -> String {
-    let r = MARKER_PX;
+fn marker(cloud: &Cloud, (x, y): (f64, f64), scale: f64) -> String {
+    let r = scale * MARKER_PX;
     let path = match cloud.look % 5 {
         0 => format!(
             "M{:.1} {y:.1}a{r} {r} 0 1 0 {} 0a{r} {r} 0 1 0 -{} 0z",
@@ -485,6 +487,7 @@ mod tests {
             x,
             y,
             label: "20 × 1".to_owned(),
+            scale: 1.0,
         };
         ScatterChart {
             size_px: (420.0, 300.0),

@@ -19,7 +19,9 @@ pub fn way_from_entry(
     slack_m: f32,
 ) -> Option<(f32, f32)> {
     let cosine = normal.dot(to_light).max(MIN_ENTRY_COSINE);
-    let s = (entry - at).dot(normal) / cosine;
+    let way = entry - at;
+    let along = way.dot(to_light);
+    let s = along + (way - along * to_light).dot(normal) / cosine;
     (s > -slack_m).then_some((s.max(0.0), cosine))
 }
 
@@ -57,5 +59,15 @@ mod tests {
             way_from_entry(0.001 * Vec3::Z, Vec3::Z, Vec3::ZERO, Vec3::X, 0.0).unwrap();
         assert_eq!(cosine, 0.05);
         assert!((s - 0.02).abs() < 1e-7, "{s}");
+    }
+
+    #[test]
+    fn an_entry_on_the_ray_has_its_own_way_however_the_normal_is_turned_from_the_light() {
+        let to_light = Vec3::new(0.3, -0.4, 0.6).normalize();
+        for normal in [Vec3::X, Vec3::Z, -to_light, Vec3::new(0.8, 0.6, 0.0)] {
+            let (s, _) =
+                way_from_entry(0.004 * to_light, normal, Vec3::ZERO, to_light, 0.0).unwrap();
+            assert!((s - 0.004).abs() < 1e-8, "{normal}: {s}");
+        }
     }
 }

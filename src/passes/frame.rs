@@ -3,15 +3,14 @@
 use super::depth_maps::DepthMaps;
 use super::draw::Target;
 use super::geometry::{Geometry, GeometryTargets};
-use super::light_path::{LightPath, LightPathKnobs, RefitCounts};
+use super::light_path::{LightPath, LightPathKnobs, RefitCounts, patch_share};
 use super::lightmap::{LightMap, uv_per_m};
 use super::maps::Maps;
 use super::mesh_buffers::MeshBuffers;
 use super::plane_carried::PlaneCarried;
 use super::plane_full::PlaneFull;
 use super::plane_incremental::PlaneIncremental;
-use super::plane_sampled::PlaneSampled;
-use super::quadric::Quadrics;
+use super::sampled_fit::Fit;
 use super::shadow::Shadow;
 use super::surface::{Surface, SurfaceInputs};
 use super::tangents::Tangents;
@@ -62,11 +61,15 @@ impl FramePlan {
                 method == Some(LightPathMethod::Incremental),
             ),
             (
-                PlaneSampled::NAME,
+                Fit::Plane.name(),
                 2,
                 method == Some(LightPathMethod::Sampled),
             ),
-            (Quadrics::NAME, 2, method == Some(LightPathMethod::Quadric)),
+            (
+                Fit::Quadric.name(),
+                2,
+                method == Some(LightPathMethod::Quadric),
+            ),
             (DepthMaps::NAME, scene.lights.len() as u32, by_depth),
             (Shadow::NAME, 1, shadow && !by_depth),
             (LightMap::NAME, 1, gooey),
@@ -160,11 +163,17 @@ fn shadow_map<'a>(
         .unwrap_or(none)
 }
 
-/// Radius of the patches of a scene [m]: told, or from the densest layer's extinction.
-pub fn patch_radius_m(scene: &Scene) -> f32 {
+/// How far light is followed below the surface of a scene [m]: the told radius, or from the densest layer's extinction.
+pub fn light_radius_m(scene: &Scene) -> f32 {
     scene.light_path.radius_m.unwrap_or_else(|| {
         radius_from_extinction_m(scene.surface.bounding_extinction_per_m(), PATCH_EPSILON)
     })
+}
+
+/// Radius of the patches of a scene [m]: told, or the share of [`light_radius_m`] that the method fits best over.
+pub fn patch_radius_m(scene: &Scene) -> f32 {
+    let told = scene.light_path.radius_m;
+    told.unwrap_or_else(|| patch_share(scene.light_path.method) * light_radius_m(scene))
 }
 
 /// How far a point may lie from where its patches last saw it [m]: told, or a share of their radius.
@@ -335,6 +344,16 @@ impl FramePasses {
         self.tone_map = ToneMap::new(gpu, &self.radiance, &self.targets.depth)?;
         self.size = size;
         Ok(())
+    }
+
+    /// The maps that say where light enters, where the light path asks for them.
+    pub fn depth_maps(&self) -> Option<&DepthMaps> {
+        self.depth_maps.as_ref()
+    }
+
+    /// The lights, the one that casts shadows first.
+    pub fn lights(&self) -> &[PlacedLight] {
+        &self.lights
     }
 
     /// Takes over changed knobs of the surface; what needs other passes needs [`FramePasses::new`].

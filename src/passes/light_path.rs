@@ -5,8 +5,7 @@ use super::moved_leaves::SampledPatches;
 use super::plane_carried::PlaneCarried;
 use super::plane_full::PlaneFull;
 use super::plane_incremental::PlaneIncremental;
-use super::plane_sampled::PlaneSampled;
-use super::quadric::Quadrics;
+use super::sampled_fit::{Fit, SampledFit};
 use super::tangents::Tangents;
 use crate::geom::SurfaceMesh;
 use crate::geom::patch::Patches;
@@ -38,10 +37,17 @@ pub enum LightPath {
     Full(PlaneFull),
     /// The planes near moved points anew.
     Incremental(PlaneIncremental),
-    /// The same from sixteen samples each.
-    Sampled(PlaneSampled),
-    /// Paraboloids from the same samples.
-    Quadric(Quadrics),
+    /// The same from sixteen samples each, or paraboloids from those.
+    Sampled(SampledFit),
+}
+
+/// Radius of the patches of a method as a share of how far light is followed: a paraboloid, which passes through its
+/// point and is tangent there, errs a quarter less over half of the radius (`palpate study planes`).
+pub fn patch_share(method: LightPathMethod) -> f32 {
+    match method {
+        LightPathMethod::Quadric => 0.5,
+        _ => 1.0,
+    }
 }
 
 /// What a scene says of its light path.
@@ -155,26 +161,22 @@ impl LightPath {
             LightPathMethod::Sampled | LightPathMethod::Quadric => {
                 let samples = Samples::new(&mesh.points, &patches);
                 let dependents = samples.dependents(&mesh.point_triangles());
-                let sampled = |samples| SampledPatches {
-                    samples,
+                let points = &mesh.points[..];
+                let (fit, samples) = match method {
+                    LightPathMethod::Sampled => (Fit::Plane, samples),
+                    _ => (Fit::Quadric, samples.weighted_to_the_middle(points)),
+                };
+                let patches = SampledPatches {
+                    samples: &samples,
                     dependents: &dependents,
                     radius_m,
                     tolerance_m,
                     skip_m,
                 };
-                let points = &mesh.points;
-                if method == LightPathMethod::Sampled {
-                    let patches = sampled(&samples);
-                    Self::Sampled(PlaneSampled::new(
-                        gpu, points, &normals, &patches, buffers, tangents,
-                    )?)
-                } else {
-                    let samples = samples.weighted_to_the_middle(points);
-                    let patches = sampled(&samples);
-                    Self::Quadric(Quadrics::new(
-                        gpu, points, &normals, &patches, buffers, tangents,
-                    )?)
-                }
+                let rest = [points, &normals[..]];
+                Self::Sampled(SampledFit::new(
+                    gpu, fit, rest, &patches, buffers, tangents,
+                )?)
             }
         })
     }
@@ -187,7 +189,6 @@ impl LightPath {
             Self::Full(pass) => pass.record(encoder, timer),
             Self::Incremental(pass) => pass.record(encoder, timer),
             Self::Sampled(pass) => pass.record(encoder, timer),
-            Self::Quadric(pass) => pass.record(encoder, timer),
         }
     }
 
@@ -200,8 +201,10 @@ impl LightPath {
             Self::Carried(pass) => Primitives::Planes(&pass.planes),
             Self::Full(pass) => Primitives::Planes(&pass.planes),
             Self::Incremental(pass) => Primitives::Planes(&pass.planes),
-            Self::Sampled(pass) => Primitives::Planes(&pass.planes),
-            Self::Quadric(pass) => Primitives::Quadrics(&pass.quadrics),
+            Self::Sampled(pass) => match pass.fit {
+                Fit::Plane => Primitives::Planes(&pass.primitives),
+                Fit::Quadric => Primitives::Quadrics(&pass.primitives),
+            },
         }
     }
 
@@ -220,8 +223,7 @@ impl LightPath {
             Self::Carried(_) => &[PlaneCarried::NAME],
             Self::Full(_) => &[PlaneFull::NAME],
             Self::Incremental(_) => &[PlaneIncremental::NAME],
-            Self::Sampled(_) => &[PlaneSampled::NAME],
-            Self::Quadric(_) => &[Quadrics::NAME],
+            Self::Sampled(pass) => pass.fit.names(),
         }
     }
 
@@ -242,7 +244,6 @@ impl LightPath {
             }),
             Self::Incremental(pass) => pass.counts(gpu),
             Self::Sampled(pass) => pass.leaves.counts(gpu),
-            Self::Quadric(pass) => pass.leaves.counts(gpu),
         }
     }
 }

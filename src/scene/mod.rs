@@ -71,8 +71,8 @@ pub struct Scene {
 pub struct LightPathSection {
     /// Which primitive stands for the surface around a point.
     pub method: LightPathMethod,
-    /// Radius of the patch that a plane is fitted to [m]. Left out, it follows from the extinction
-    /// of the densest layer (François 2006, section 2.2), and is at least the 16 nearest points.
+    /// Radius of the patch that a plane or paraboloid is fitted to [m]. Left out, it follows from the extinction of the
+    /// densest layer (François 2006, section 2.2), for paraboloids half of that. At least the 16 nearest points.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_m: Option<f32>,
     /// How far a point moves before `incremental`, `sampled` and `quadric` take notice [m]. Left out, 1/4000
@@ -87,7 +87,7 @@ pub struct LightPathSection {
 impl Default for LightPathSection {
     fn default() -> Self {
         Self {
-            method: LightPathMethod::Incremental,
+            method: LightPathMethod::Quadric,
             radius_m: None,
             tolerance_m: None,
             skip_optical_depth: 0.0,

@@ -6,7 +6,7 @@ use super::output::{self, json_file};
 use super::run::{DocumentOf, cells_of};
 use super::shard::Shard;
 use super::sweep::{RowOf, Sweep, key};
-use crate::app::{AppError, Outcome};
+use crate::app::{AppError, Outcome, thread_count};
 use crate::measure::files::create_folder;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -103,6 +103,7 @@ pub fn merge<S: Sweep>(out: &Path, parts: &[PathBuf]) -> Result<Outcome, AppErro
         )));
     }
     create_folder(out)?;
+    S::finish(&document.header.plan, out, thread_count(None))?;
     output::write::<S>(out, &document)?;
     Ok(Outcome::Done)
 }

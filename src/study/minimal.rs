@@ -513,6 +513,7 @@ fn chart(rows: &[&Row<Cell, Measures>]) -> ScatterChart {
                 .change_rms
                 .map(|c| (100.0 * c).max(CHANGE_RANGE.0)),
             label: row.cell.feature.name().to_owned(),
+            scale: 1.0,
         };
         match clouds.iter_mut().find(|cloud| cloud.label == label) {
             Some(cloud) => cloud.points.push(point),

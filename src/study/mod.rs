@@ -15,7 +15,7 @@ mod oracle;
 mod output;
 mod peers;
 mod plan;
-mod planes;
+pub(crate) mod planes;
 mod pokes;
 mod random;
 mod run;

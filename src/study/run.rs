@@ -72,7 +72,9 @@ pub fn run<S: Sweep>(options: &StudyOptions) -> Result<Outcome, AppError> {
             Ok(())
         })?;
         bar.finish_and_clear();
-        sweep.finish()?;
+    }
+    if options.shard.is_none() {
+        S::finish(&header.plan, &out, options.threads)?;
     }
     let in_order = |cell: &S::Cell| rows.remove(&key(cell)).expect("every cell has its row");
     let document = Document {

@@ -361,6 +361,7 @@ fn chart(rows: &[Row<Cell, Measures>]) -> ScatterChart {
             x: stretch,
             y: Some((100.0 * error.abs()).max(ERROR_RANGE.0)),
             label: String::new(),
+            scale: 1.0,
         };
         match clouds.iter_mut().find(|cloud| cloud.label == label) {
             Some(cloud) => cloud.points.push(point),

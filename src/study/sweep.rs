@@ -53,12 +53,14 @@ pub trait Sweep: Sync + Sized {
     /// [`AppError`] if a file can't be read or written; a method that fails is a row, not an error.
     fn measure(&self, cell: &Self::Cell) -> Result<RowOf<Self>, AppError>;
 
-    /// Writes what is no row, such as pictures, once all cells are measured.
+    /// Writes what is no row, such as pictures, into `out` once all cells are measured: at the end of a run of the
+    /// whole, or where its parts are joined.
     ///
     /// # Errors
     ///
     /// [`AppError`] naming the file that can't be written.
-    fn finish(&self) -> Result<(), AppError> {
+    fn finish(plan: &Self::Plan, out: &Path, threads: usize) -> Result<(), AppError> {
+        let _ = (plan, out, threads);
         Ok(())
     }
 

@@ -27,7 +27,7 @@ pub enum DrawnPrimitives {
     /// The matrix of the paraboloid [1/m].
     Quadrics(Vec<[Vec4; 2]>),
     /// Nothing a point: a map of each light of each eye.
-    DepthMaps(Vec<[DepthMap; 3]>),
+    DepthMaps(Vec<Vec<DepthMap>>),
 }
 
 /// Where one light enters, as the shaders read it.
@@ -165,7 +165,7 @@ pub enum Cover<'a> {
     },
     DepthMaps {
         normal: Vec3,
-        maps: &'a [DepthMap; 3],
+        maps: &'a [DepthMap],
     },
 }
 

@@ -13,6 +13,11 @@ mod sight;
 mod stage;
 mod trial;
 
+pub use estimate::{Blend, Drawn, DrawnPrimitives};
+pub use picture::heat;
+pub use sight::{Sight, exact_normals, tissue_of, way_of};
+pub use stage::read_depth_maps;
+
 use super::Study;
 use super::findings::Findings;
 use super::sweep::{Row, Sweep};
@@ -155,8 +160,6 @@ pub struct Measures {
 /// The study.
 pub struct Planes {
     bench: Bench,
-    plan: Plan,
-    out: std::path::PathBuf,
 }
 
 impl Sweep for Planes {
@@ -304,11 +307,9 @@ impl Sweep for Planes {
         Ok(Gpu::headless().map_err(AppError::Gpu)?.adapter)
     }
 
-    fn new(plan: &Plan, out: &Path, threads: usize) -> Result<Self, AppError> {
+    fn new(_: &Plan, _: &Path, threads: usize) -> Result<Self, AppError> {
         Ok(Self {
             bench: Bench::new(Gpu::headless().map_err(AppError::Gpu)?, threads),
-            plan: plan.clone(),
-            out: out.to_owned(),
         })
     }
 
@@ -316,8 +317,13 @@ impl Sweep for Planes {
         self.bench.measure(cell)
     }
 
-    fn finish(&self) -> Result<(), AppError> {
-        picture::write(&self.bench, &self.plan, &self.out)
+    fn finish(plan: &Plan, out: &Path, threads: usize) -> Result<(), AppError> {
+        let side_px = plan.oracle.picture_px;
+        if side_px == 0 {
+            return Ok(());
+        }
+        let bench = Bench::new(Gpu::headless().map_err(AppError::Gpu)?, threads);
+        picture::write(&bench, side_px, out)
     }
 
     fn findings(rows: &[Row<Cell, Measures>]) -> Findings {

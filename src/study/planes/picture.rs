@@ -2,15 +2,14 @@
 //! rays, and how far off each pixel is. Planes left in place are those of the rest pose, where they were in space, blended
 //! as published.
 
-use super::Plan;
 use super::body::Body;
 use super::estimate::{Blend, Drawn};
-use super::sight::{OFF_M, SAMPLES, Sight, exact_normals, is_shaded};
+use super::sight::{SAMPLES, Sight, exact_normals, is_shaded, way_of};
 use super::trial::Bench;
 use crate::app::{AppError, Session, load_scene};
 use crate::geom::plane::LightPathMethod;
 use crate::measure::{caption, files};
-use crate::passes::frame::patch_radius_m;
+use crate::passes::frame::light_radius_m;
 use crate::reference::{EvenTissue, Rays, all_by};
 use glam::{DVec3, Vec3};
 use image::{Rgba, RgbaImage};
@@ -38,19 +37,14 @@ const CAPTION_DOTS: u32 = 9;
 const PAPER: Rgba<u8> = Rgba([24, 26, 30, 255]);
 const INK: Rgba<u8> = Rgba([235, 235, 235, 255]);
 
-/// Writes `planes.png` into `out`, unless the plan wants none.
+/// Writes `planes.png` into `out`, with panels of `side` pixels.
 ///
 /// # Errors
 ///
 /// [`AppError`] if the organ can't be loaded, the GPU fails or the file can't be written.
-pub fn write(bench: &Bench, plan: &Plan, out: &Path) -> Result<(), AppError> {
-    let side = plan.oracle.picture_px;
-    if side == 0 {
-        return Ok(());
-    }
-    let mut scene = load_scene(SCENE, &[])?;
-    scene.light_path.radius_m = Some(patch_radius_m(&scene));
-    let radius_m = patch_radius_m(&scene);
+pub fn write(bench: &Bench, side: u32, out: &Path) -> Result<(), AppError> {
+    let scene = load_scene(SCENE, &[])?;
+    let radius_m = light_radius_m(&scene);
     let mut session = Session::new(scene, bench.threads())?;
     while session.time_s() < DEEPEST_S {
         session.tick();
@@ -61,7 +55,10 @@ pub fn write(bench: &Bench, plan: &Plan, out: &Path) -> Result<(), AppError> {
     let sights = view.sights(side, bench.threads());
     let truth = all_by(bench.threads(), &sights, |sight| {
         sight.as_ref().map_or(DVec3::ZERO, |sight| {
-            view.radiance(sight, |inside, _| view.rays.exit_m((inside, view.to_light)))
+            view.radiance(sight, |inside, _| {
+                let way = way_of(&view.rays, inside, view.to_light);
+                way.length_m.filter(|_| !way.is_shaded)
+            })
         })
     });
     let mut panels = vec![("truth by rays".to_owned(), truth.clone())];
@@ -154,37 +151,24 @@ impl View {
         let from = on_plane + 10.0 * self.width_m * self.to_eye;
         let (distance, triangle) = self.rays.first((from, -self.to_eye))?;
         let place = from - distance * self.to_eye;
-        let corners = self.triangles[triangle];
-        let [a, b, c] = corners.map(|corner| self.points[corner as usize]);
-        let area = (b - a).cross(c - a);
-        let part = |p: DVec3, q: DVec3| p.cross(q).dot(area) / area.length_squared();
-        let shares = DVec3::new(
-            part(b - place, c - place),
-            part(c - place, a - place),
-            part(a - place, b - place),
-        );
-        let normal: DVec3 = (0..3)
-            .map(|k| shares[k] * self.normals[corners[k] as usize])
-            .sum();
-        let cos_eye = normal.normalize_or_zero().dot(self.to_eye).max(0.05);
-        let far_m = self
-            .rays
-            .exit_m((place - OFF_M * self.to_eye, -self.to_eye))?;
-        Some(Sight {
-            eye: 0,
-            corners,
-            shares: shares.as_vec3(),
+        let sight = Sight::at(
             place,
-            to_eye: self.to_eye,
+            self.to_eye,
+            self.triangles[triangle],
+            [&self.points, &self.normals],
+            &self.rays,
+            self.radius_m,
+        )?;
+        // What faces away is lit through the body or not at all: the way itself tells.
+        let normal: DVec3 = (0..3)
+            .map(|k| f64::from(sight.shares[k]) * self.normals[sight.corners[k] as usize])
+            .sum();
+        let is_dark = normal.dot(self.to_light) > 0.0
+            && is_shaded(&self.rays, place, self.to_light, self.radius_m);
+        Some(Sight {
             to_lights: [self.to_light; 3],
-            cos_lights: [0.0; 3],
-            reach_m: (0.5 * self.radius_m / cos_eye).min(self.radius_m),
-            far_m,
-            // What faces away is lit through the body or not at all: the way itself tells.
-            is_shaded: [normal.dot(self.to_light) > 0.0
-                && is_shaded(&self.rays, place, self.to_light, self.radius_m);
-                3],
-            is_poked: false,
+            is_shaded: [is_dark; 3],
+            ..sight
         })
     }
 
@@ -283,8 +267,8 @@ fn shown(linear: DVec3) -> Rgba<u8> {
     Rgba([encoded[0], encoded[1], encoded[2], 255])
 }
 
-/// Black over violet and orange to pale yellow.
-fn heat(share: f64) -> Rgba<u8> {
+/// The colour of a share of the scale: black over violet and orange to pale yellow.
+pub fn heat(share: f64) -> Rgba<u8> {
     const STOPS: [[f64; 3]; 5] = [
         [6.0, 6.0, 12.0],
         [87.0, 16.0, 110.0],

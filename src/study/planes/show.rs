@@ -13,8 +13,10 @@ type PlanesRow = Row<Cell, Measures>;
 
 const CHART_PX: (f64, f64) = (470.0, 340.0);
 const COLUMNS: usize = 2;
-/// What the charts show of the cost [ms]; methods without a pass stand at the left edge.
-const MS_RANGE: (f64, f64) = (0.01, 1000.0);
+/// What the charts show of the cost [ms].
+const MS_RANGE: (f64, f64) = (0.003, 200.0);
+/// Where methods without a pass stand [ms], each beside the other.
+const NO_PASS_MS: [f64; 3] = [0.004, 0.0065, 0.0105];
 /// What the charts show of the error [%].
 const ERROR_RANGE: (f64, f64) = (0.1, 100.0);
 /// The size of mesh that charts show, or what is nearest to it.
@@ -167,24 +169,32 @@ fn charts(rows: &[&PlanesRow]) -> Vec<(String, String)> {
                     look,
                     hollow: false,
                     joined: true,
-                    points: points(rows, method, deformation, |m| m.radiance_error_rel),
+                    points: points(rows, method, deformation, |m| m.radiance_error_rel, {
+                        NO_PASS_MS[usize::from(method == LightPathMethod::Stale)]
+                    }),
                 })
                 .collect();
             let stale = LightPathMethod::Stale;
-            let left = points(rows, stale, deformation, |m| m.radiance_error_in_place_rel);
+            let left = points(
+                rows,
+                stale,
+                deformation,
+                |m| m.radiance_error_in_place_rel,
+                NO_PASS_MS[2],
+            );
             if !left.is_empty() {
                 clouds.push(Cloud {
                     label: "stale, left in place".to_owned(),
                     look: LightPathMethod::ALL.len(),
                     hollow: true,
-                    joined: false,
+                    joined: true,
                     points: left,
                 });
             }
             let chart = ScatterChart {
                 size_px: CHART_PX,
-                title: deformation.name().to_owned(),
-                x_label: "GPU time of the refit [ms]; at the left edge: none".to_owned(),
+                title: format!("{}; {}", deformation.name(), sizes(rows)),
+                x_label: "GPU time of the refit [ms]; left of 0.02: no pass".to_owned(),
                 y_label: "error of radiance [%]".to_owned(),
                 x_range: MS_RANGE,
                 y_range: ERROR_RANGE,
@@ -195,21 +205,37 @@ fn charts(rows: &[&PlanesRow]) -> Vec<(String, String)> {
         .collect()
 }
 
-/// A point a radius for what `measure` is known of.
+/// What the sizes of the markers mean.
+fn sizes(rows: &[&PlanesRow]) -> String {
+    let radii: Vec<String> = radii(rows).into_iter().map(|r| number(100.0 * r)).collect();
+    format!(
+        "markers from small to large: radius of {} %",
+        radii.join(", ")
+    )
+}
+
+/// A point a radius for what `measure` is known of, the larger the farther the patches reach; one without a pass stands
+/// at `no_pass_ms`.
 fn points(
     rows: &[&PlanesRow],
     method: LightPathMethod,
     deformation: Deformation,
     measure: impl Fn(&Measures) -> Option<f64>,
+    no_pass_ms: f64,
 ) -> Vec<Point> {
     radii(rows)
         .into_iter()
-        .filter_map(|radius| {
+        .enumerate()
+        .filter_map(|(index, radius)| {
             let row = row_of(rows, method, deformation, radius)?;
             Some(Point {
-                x: row.measures.refit_ms_p50.unwrap_or(0.0).max(MS_RANGE.0),
+                x: match row.measures.refit_ms_p50 {
+                    Some(ms) if ms > 0.0 => ms.max(no_pass_ms),
+                    _ => no_pass_ms,
+                },
                 y: Some(100.0 * measure(&row.measures)?),
-                label: share_name(radius),
+                label: String::new(),
+                scale: 0.6 + 0.2 * index as f64,
             })
         })
         .collect()

@@ -21,6 +21,9 @@ pub const SAMPLES: usize = 20;
 const COS_EYE_MIN: f64 = 0.05;
 /// Light that is left at the radius of a patch: ε of François 2006, section 2.2.
 const EPSILON: f64 = 0.01;
+/// Half the width of the edge of a cast shadow, as a share of the body's size: a texel and a half of a depth map. Which
+/// side of it a place lies on is a matter of the map's resolution, and no more the light path's than the shadow is.
+const SHADOW_EDGE_SHARE: f64 = 0.002;
 /// How far rays start off the triangle that a place lies on [m].
 pub const OFF_M: f64 = 1e-9;
 const SEED: u64 = 2010;
@@ -52,6 +55,45 @@ pub struct Sight {
 }
 
 impl Sight {
+    /// A look from `to_eye` at a `place` [m] on the triangle of these `corners`, of a surface at `points` [m] with these
+    /// normals, where patches reach `radius_m` far. Its lights are all at the eye, and it counts as lit. `None` if no ray goes
+    /// through the body there.
+    pub fn at(
+        place: DVec3,
+        to_eye: DVec3,
+        corners: [u32; 3],
+        [points, normals]: [&[DVec3]; 2],
+        rays: &Rays,
+        radius_m: f64,
+    ) -> Option<Self> {
+        let [a, b, c] = corners.map(|corner| points[corner as usize]);
+        let area = (b - a).cross(c - a);
+        let part = |p: DVec3, q: DVec3| p.cross(q).dot(area) / area.length_squared();
+        let shares = DVec3::new(
+            part(b - place, c - place),
+            part(c - place, a - place),
+            part(a - place, b - place),
+        );
+        let normal: DVec3 = (0..3)
+            .map(|k| shares[k] * normals[corners[k] as usize])
+            .sum();
+        let normal = normal.normalize_or_zero();
+        let cos_eye = normal.dot(to_eye).max(COS_EYE_MIN);
+        Some(Self {
+            eye: 0,
+            corners,
+            shares: shares.as_vec3(),
+            place,
+            to_eye,
+            to_lights: [to_eye; 3],
+            cos_lights: [cos_eye; 3],
+            reach_m: reach_m(radius_m, cos_eye),
+            far_m: rays.exit_m((place - OFF_M * to_eye, -to_eye))?,
+            is_shaded: [false; 3],
+            is_poked: false,
+        })
+    }
+
     /// Length of a sample [m].
     pub fn step_m(&self) -> f64 {
         self.reach_m / SAMPLES as f64
@@ -70,7 +112,7 @@ impl Sight {
 pub struct Way {
     /// Length to where it first leaves the body [m].
     pub length_m: Option<f64>,
-    /// Whether it meets the body again beyond: a cast shadow.
+    /// Whether it meets the body again beyond: a cast shadow, or the very edge of one.
     pub is_shaded: bool,
 }
 
@@ -137,7 +179,10 @@ impl Truth {
             });
             sights.extend(seen.into_iter().flatten().take(sights_per_eye));
         }
-        let ways = all_by(threads, &sights, |sight| ways(sight, &rays));
+        let edge_m = SHADOW_EDGE_SHARE * f64::from(body.size_m);
+        let ways = all_by(threads, &sights, |sight| {
+            ways(sight, &rays, radius_m, edge_m)
+        });
         Self {
             sights,
             ways,
@@ -205,8 +250,7 @@ impl Look {
             to_eye: self.to_eye,
             to_lights: self.to_lights,
             cos_lights: self.to_lights.map(|to_light| normal.dot(to_light)),
-            // As deep as half the radius, and never farther than the radius.
-            reach_m: (0.5 * self.radius_m / cos_eye).min(self.radius_m),
+            reach_m: reach_m(self.radius_m, cos_eye),
             far_m,
             is_shaded: self
                 .to_lights
@@ -216,26 +260,49 @@ impl Look {
     }
 }
 
+/// How far a view goes in [m]: as deep as half the radius, and never farther than the radius.
+fn reach_m(radius_m: f64, cos_eye: f64) -> f64 {
+    (0.5 * radius_m / cos_eye).min(radius_m)
+}
+
 /// Whether something stands between `place` and a light: not the surface round it, whose facets rise before each
 /// other where light grazes, and which is the light path's to know.
 pub fn is_shaded(rays: &Rays, place: DVec3, to_light: DVec3, radius_m: f64) -> bool {
     rays.is_blocked((place, to_light), 0.5 * radius_m)
 }
 
-fn ways(sight: &Sight, rays: &Rays) -> Ways {
+fn ways(sight: &Sight, rays: &Rays, radius_m: f64, edge_m: f64) -> Ways {
     let mut ways = Ways::default();
     for (i, t) in sight.samples_m() {
         let inside = sight.place - t * sight.to_eye;
         for (way, to_light) in ways.iter_mut().zip(sight.to_lights) {
-            let length_m = rays.exit_m((inside, to_light));
-            let beyond = length_m.map(|exit| exit + OFF_M);
-            way[i] = Way {
-                length_m,
-                is_shaded: beyond.is_some_and(|m| rays.is_blocked((inside, to_light), m)),
-            };
+            let mut found = way_of(rays, inside, to_light);
+            if let Some(length_m) = found.length_m {
+                let out = inside + length_m * to_light;
+                found.is_shaded |= is_by_shadow(rays, out, to_light, radius_m, edge_m);
+            }
+            way[i] = found;
         }
     }
     ways
+}
+
+/// Whether a light's way that leaves the body at `out` [m] passes another part of it nearer than `edge_m`.
+fn is_by_shadow(rays: &Rays, out: DVec3, to_light: DVec3, radius_m: f64, edge_m: f64) -> bool {
+    let (u, v) = to_light.any_orthonormal_pair();
+    [u, v, -u, -v]
+        .iter()
+        .any(|&aside| is_shaded(rays, out + edge_m * aside, to_light, radius_m))
+}
+
+/// The true way from a place `inside` [m] to a light.
+pub fn way_of(rays: &Rays, inside: DVec3, to_light: DVec3) -> Way {
+    let length_m = rays.exit_m((inside, to_light));
+    let beyond = length_m.map(|exit| exit + OFF_M);
+    Way {
+        length_m,
+        is_shaded: beyond.is_some_and(|m| rays.is_blocked((inside, to_light), m)),
+    }
 }
 
 /// A place spread evenly over a triangle.
@@ -303,6 +370,25 @@ mod tests {
                 inside
             );
         }
+    }
+
+    #[test]
+    fn places_by_the_edge_of_a_shadow_are_told_from_those_off_it() {
+        // A roof a metre above, over x > 0.
+        let roof = [
+            DVec3::new(0.0, -9.0, 1.0),
+            DVec3::new(9.0, 0.0, 1.0),
+            DVec3::new(0.0, 9.0, 1.0),
+        ];
+        let rays = Rays::new(&roof, &[[0, 1, 2]]);
+        let by = |x: f64, edge_m: f64| {
+            is_by_shadow(&rays, DVec3::new(x, 0.0, 0.0), DVec3::Z, 0.01, edge_m)
+        };
+        assert!(by(-0.001, 0.002) && by(0.001, 0.002));
+        assert!(!by(-0.003, 0.002));
+        // Nearer than half a radius it is the surface round the place.
+        let near = DVec3::new(-0.001, 0.0, 0.998);
+        assert!(!is_by_shadow(&rays, near, DVec3::Z, 0.01, 0.002));
     }
 
     #[test]

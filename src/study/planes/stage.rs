@@ -5,7 +5,7 @@ use super::estimate::{DepthMap, Drawn, DrawnPrimitives};
 use crate::geom::plane::LightPathMethod;
 use crate::gpu::{Gpu, GpuError, Timer, read_buffer, read_texture_depth, read_texture_rgba8};
 use crate::passes::depth_maps::{DepthMaps, views};
-use crate::passes::light_path::{LightPath, LightPathKnobs, Primitives, RefitCounts};
+use crate::passes::light_path::{LightPath, LightPathKnobs, Primitives, RefitCounts, patch_share};
 use crate::passes::mesh_buffers::MeshBuffers;
 use crate::passes::tangents::Tangents;
 use crate::scene::PlacedLight;
@@ -13,8 +13,9 @@ use glam::{DVec3, Mat4, Vec3};
 
 /// How far a point moves before a fit takes notice, as a share of the radius: what scenes have.
 const TOLERANCE_SHARE: f32 = 1.0 / 4000.0;
-/// What a method is told of a patch of `radius_m`; `skip_m` as [`LightPathKnobs`] has it.
-pub fn knobs(method: LightPathMethod, radius_m: f32, skip_m: f32) -> LightPathKnobs {
+/// What a method is told where light is followed for `light_radius_m`; `skip_m` as [`LightPathKnobs`] has it.
+pub fn knobs(method: LightPathMethod, light_radius_m: f32, skip_m: f32) -> LightPathKnobs {
+    let radius_m = patch_share(method) * light_radius_m;
     LightPathKnobs {
         method,
         radius_m,
@@ -144,9 +145,11 @@ impl Stage {
             Primitives::DepthMaps => {
                 let mut maps = Vec::new();
                 for of_eye in lights {
-                    let [a, b, c] =
-                        of_eye.map(|toward| self.depth_map_of(points, toward.as_vec3()));
-                    maps.push([a?, b?, c?]);
+                    let mut of_lights = Vec::new();
+                    for toward in of_eye {
+                        of_lights.extend(self.depth_map_of(points, toward.as_vec3())?);
+                    }
+                    maps.push(of_lights);
                 }
                 DrawnPrimitives::DepthMaps(maps)
             }
@@ -157,7 +160,7 @@ impl Stage {
         })
     }
 
-    fn depth_map_of(&mut self, points: &[Vec3], toward: Vec3) -> Result<DepthMap, GpuError> {
+    fn depth_map_of(&mut self, points: &[Vec3], toward: Vec3) -> Result<Vec<DepthMap>, GpuError> {
         let pass = self.depth_map.as_ref().expect("the method draws one");
         let light = far_light(toward);
         let mut encoder = self.gpu.encoder();
@@ -171,18 +174,46 @@ impl Stage {
             &mut self.timer,
         );
         self.gpu.submit_and_wait(encoder);
-        let views = views(&[light], points);
-        // Four bytes a texel, whatever they mean.
-        let normals = read_texture_rgba8(&self.gpu, &pass.normals.texture)?;
-        Ok(DepthMap {
-            clip_from_world: Mat4::from_cols_array(&views.clip_from_world[0]),
-            world_from_clip: Mat4::from_cols_array(&views.world_from_clip[0]),
-            slack_m: views.slack_m[0],
-            side: pass.depth.texture.height(),
-            depth: read_texture_depth(&self.gpu, &pass.depth.texture)?,
-            normals: bytemuck::pod_collect_to_vec(&normals),
-        })
+        read_depth_maps(&self.gpu, pass, &[light], points)
     }
+}
+
+/// The maps that `pass` drew last of `lights` with the surface at `points` [m], one a light.
+///
+/// # Errors
+///
+/// [`GpuError::ReadBack`] if they can't be read.
+pub fn read_depth_maps(
+    gpu: &Gpu,
+    pass: &DepthMaps,
+    lights: &[PlacedLight],
+    points: &[Vec3],
+) -> Result<Vec<DepthMap>, GpuError> {
+    let views = views(lights, points);
+    let depth = read_texture_depth(gpu, &pass.depth.texture)?;
+    // Four bytes a texel, whatever they mean.
+    let normals: Vec<u32> =
+        bytemuck::pod_collect_to_vec(&read_texture_rgba8(gpu, &pass.normals.texture)?);
+    let side = pass.depth.texture.height();
+    let (width, tile) = (pass.depth.texture.width() as usize, side as usize);
+    Ok((0..lights.len())
+        .map(|k| {
+            // They lie side by side.
+            let columns = |row: usize| row * width + k * tile..row * width + (k + 1) * tile;
+            DepthMap {
+                clip_from_world: Mat4::from_cols_array(&views.clip_from_world[k]),
+                world_from_clip: Mat4::from_cols_array(&views.world_from_clip[k]),
+                slack_m: views.slack_m[k],
+                side,
+                depth: (0..tile)
+                    .flat_map(|row| depth[columns(row)].iter().copied())
+                    .collect(),
+                normals: (0..tile)
+                    .flat_map(|row| normals[columns(row)].iter().copied())
+                    .collect(),
+            }
+        })
+        .collect())
 }
 
 fn far_light(toward: Vec3) -> PlacedLight {

@@ -10,7 +10,7 @@ use crate::app::AppError;
 use crate::geom::plane::{LightPathMethod, skip_from_optical_depth_m};
 use crate::gpu::{Gpu, GpuError};
 use crate::measure::stats::Stats;
-use crate::passes::light_path::RefitCounts;
+use crate::passes::light_path::{RefitCounts, patch_share};
 use crate::study::sweep::{Cost, Row, State, Verdict, finite};
 use glam::{DVec3, Vec3};
 use std::path::Path;
@@ -90,10 +90,11 @@ impl Bench {
     pub fn measure(&self, cell: &Cell) -> Result<Row<Cell, Measures>, AppError> {
         let body = self.body(cell)?;
         let radius_m = (cell.radius_share * cell.size_m) as f32;
-        let exact_key = format!("{}|{}|{}", body_key(cell), cell.radius_share, cell.origin_m);
+        let patch_m = patch_share(cell.method) * radius_m;
+        let exact_key = format!("{}|{patch_m}|{}", body_key(cell), cell.origin_m);
         let origin_m = Vec3::X * cell.origin_m as f32;
         let exact = kept(&self.exact, exact_key, || {
-            Ok(Exact::new(&body, radius_m, origin_m))
+            Ok(Exact::new(&body, patch_m, origin_m))
         })?;
         let pose = cell.deformation.apply(&body);
         let run = match self.run(cell, &body, &pose, radius_m) {

@@ -110,6 +110,7 @@ fn chart(groups: &[Group]) -> ScatterChart {
             x: group.speed_m_s,
             y: (!group.has_failed()).then(|| 100.0 * group.deepest()),
             label: String::new(),
+            scale: 1.0,
         };
         match clouds.iter_mut().find(|cloud| cloud.label == label) {
             Some(cloud) => cloud.points.push(point),

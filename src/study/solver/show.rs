@@ -226,6 +226,7 @@ fn chart(
                     x: ms(row)?,
                     y: error(row).map(|e| 100.0 * e),
                     label: setting(&row.cell),
+                    scale: 1.0,
                 })
             };
             rows.iter().filter_map(point).collect()
@@ -253,6 +254,7 @@ fn chart(
             x: peer.ms,
             y: peer_error(peer).map(|e| 100.0 * e),
             label: peer.label(),
+            scale: 1.0,
         })
         .collect();
     if !others.is_empty() {
