@@ -18,6 +18,8 @@ struct LightViews {
 
 @group(0) @binding(11) var<uniform> light_views: LightViews;
 @group(0) @binding(12) var entry_normals: texture_2d<u32>;
+// Depth of the nearest back faces as the eye sees them.
+@group(0) @binding(13) var exit_map: texture_depth_2d;
 
 // A way that is read knows of every shadow.
 const SEES_SHADOWS: bool = true;
@@ -62,7 +64,18 @@ fn way_under(cover: Cover, facing: Facing, t: f32, blend: f32) -> vec2f {
     return way_from_entry(far.xyz / far.w, normal, at, facing.to_light, light_views.slack_m[k]);
 }
 
-// Where the view ray leaves the body again [m]: what lies outside is found sample by sample.
+// Where the view ray leaves the body again [m]: the nearest back face behind the pixel.
 fn exit_of(cover: Cover) -> f32 {
-    return 1e6;
+    let clip = frame.clip_from_world * vec4f(cover.world, 1.0);
+    let ndc = clip.xy / clip.w;
+    let place = vec2i(floor((ndc * vec2f(0.5, -0.5) + 0.5) * frame.size.xy));
+    let depth = textureLoad(exit_map, clamp(place, vec2i(0), vec2i(frame.size.xy) - 1), 0);
+    let far = frame.world_from_clip * vec4f(ndc, depth, 1.0);
+    let length = distance(far.xyz / far.w, cover.world);
+    return select(max(length, 1e-6), 1e6, depth >= 1.0);
+}
+
+// The cosine by which the papers' march ends; they know of planes alone.
+fn printed_cosine(cover: Cover) -> f32 {
+    return dot(cover.normal, cover.to_eye);
 }

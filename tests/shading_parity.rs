@@ -12,7 +12,7 @@ use palpate::gpu::{
 use palpate::optics::light_entry;
 use palpate::optics::light_plane::{PlanePair, way_to_light};
 use palpate::optics::light_quadric::{self, Aim, Bend};
-use palpate::optics::march::{Cover, Ray, Rule, march, reach_m};
+use palpate::optics::march::{Cover, Ray, Rule, march, printed_reach_m, reach_m};
 use palpate::optics::{Layer, blur, film, layers, medium, pack, tone};
 use palpate::passes::draw::Target;
 use palpate::passes::frame::FramePasses;
@@ -721,7 +721,12 @@ fn march_difference(gpu: &Gpu, source: &str, cover: CoverKind, rule: Rule, sampl
         Rule::ClosedForm => 1,
         Rule::Published => 2,
     };
+    let mirrored = format!(
+        "const MIRRORED: u32 = {}u;",
+        u32::from(rule == Rule::Published)
+    );
     let source = source
+        .replace("override MIRRORED: u32 = 0u;", &mirrored)
         .replace(
             "override QUADRATURE: u32 = 0u;",
             &format!("const QUADRATURE: u32 = {quadrature}u;"),
@@ -852,7 +857,7 @@ fn twin_of_march(
 ) -> Vec4 {
     let [normal, plane_normal, to_eye, tangent] =
         [normal, plane, to_eye, tangent].map(|v| v.truncate());
-    let layers: [Layer; 4] = section.layers.map(Layer::from);
+    let layers: [Layer; 4] = std::array::from_fn(|j| section.layers[j].into());
     let clearest = layers
         .iter()
         .map(|layer| layer.extinction_per_m().min_element())
@@ -883,15 +888,15 @@ fn twin_of_march(
             },
         },
     };
-    let reach = reach_m(
-        section.layer_depth_max_m,
-        normal.dot(to_eye),
-        8.0 / clearest,
-    );
+    let deepest_m = section.layer_depth_max_m;
+    let reach_m = match rule {
+        Rule::Published => printed_reach_m(deepest_m, &cover),
+        _ => reach_m(deepest_m, normal.dot(to_eye), 8.0 / clearest).min(cover.exit_m()),
+    };
     let ray = Ray {
         cover,
         light_eye: to_light.dot(to_eye),
-        reach_m: reach.min(cover.exit_m()),
+        reach_m,
     };
     let [r, g, b, _] = BOUNDARIES.map(|byte| section.layer_depth_max_m * f32::from(byte) / 255.0);
     march(&ray, &layers, |_| Vec3::new(r, g, b), samples, rule).extend(0.0)
@@ -958,7 +963,7 @@ fn ball(gpu: &Gpu, kind: &str, sets: &[&str], light: &str) -> Vec<Vec4> {
         outer: map([170, 80, 60, 128]),
         normal: map([128, 128, 255, 255]),
         inner: map([140, 40, 30, 255]),
-        layers: map(BOUNDARIES),
+        layers: vec![map(BOUNDARIES).into()],
     };
     let text = format!(
         "[body]\nshape = \"sphere\"\nextent_m = [0.1, 0.1, 0.1]\n[surface]\nkind = \"{kind}\"\n\
