@@ -24,12 +24,12 @@ struct Bottoms {
 }
 
 struct Phases {
-    of: array<f32, 8>,
+    each: array<f32, 8>,
 }
 
 // Extinction [1/m] of each layer, or what scatters in it.
 struct Layers {
-    of: array<vec3f, 8>,
+    each: array<vec3f, 8>,
 }
 
 // Which layer.
@@ -49,7 +49,7 @@ fn of_layer(j: u32, b: Bottoms) -> f32 {
 fn extinctions() -> Layers {
     var layers: Layers;
     for (var j = 0u; j < 8u; j += 1u) {
-        layers.of[j] = frame.extinction[j].xyz;
+        layers.each[j] = frame.extinction[j].xyz;
     }
     return layers;
 }
@@ -59,7 +59,7 @@ fn phases_towards(cos_angle: f32) -> Phases {
     for (var j = 0u; j < 8u; j += 1u) {
         let k = frame.extinction[j].w;
         let base = 1.0 + k * cos_angle;
-        p.of[j] = INV_FOUR_PI * (1.0 - k * k) / max(base * base, 1e-6);
+        p.each[j] = INV_FOUR_PI * (1.0 - k * k) / max(base * base, 1e-6);
     }
     return p;
 }
@@ -67,7 +67,7 @@ fn phases_towards(cos_angle: f32) -> Phases {
 fn sources_of(p: Phases) -> Layers {
     var sources: Layers;
     for (var j = 0u; j < 8u; j += 1u) {
-        sources.of[j] = p.of[j] * frame.albedo[j].xyz;
+        sources.each[j] = p.each[j] * frame.albedo[j].xyz;
     }
     return sources;
 }
@@ -87,11 +87,11 @@ fn below_all(depth: f32, bottoms: Bottoms) -> Bottoms {
 fn optical_depth(s: f32, cosine: f32, bottoms: Bottoms, layers: Layers) -> vec3f {
     let inverse = 1.0 / max(cosine, 1e-3);
     var sum = vec3f(0.0);
-    var from = 0.0;
+    var begin = 0.0;
     for (var j = 0u; j < LAYER_COUNT; j += 1u) {
         let end = select(min(of_layer(j, bottoms) * inverse, s), s, j + 1u == LAYER_COUNT);
-        sum += (end - from) * layers.of[j];
-        from = end;
+        sum += (end - begin) * layers.each[j];
+        begin = end;
     }
     return sum;
 }
@@ -128,12 +128,12 @@ fn segment(a0: vec3f, length: f32, shares: Bottoms, layers: Layers) -> Segment {
     var s: Segment;
     s.start = a0;
     var a = a0;
-    var from = 0.0;
+    var begin = 0.0;
     for (var j = 0u; j < LAYER_COUNT; j += 1u) {
         let share = select(of_layer(j, shares), 1.0, j + 1u == LAYER_COUNT);
-        a += length * (share - from) * layers.of[j];
+        a += length * (share - begin) * layers.each[j];
         s.ends[j] = a;
-        from = share;
+        begin = share;
     }
     return s;
 }
@@ -172,7 +172,7 @@ fn gather(s: Segment, before: vec3f, after: vec3f, sources: Layers) -> Gathered 
         if j + 1u == LAYER_COUNT {
             e_next = exp(-(end_of(s) + after));
         }
-        add(&sum, j, select((e - e_next) * over, (a_next - a) * mean, is_flat) * sources.of[j]);
+        add(&sum, j, select((e - e_next) * over, (a_next - a) * mean, is_flat) * sources.each[j]);
         a = a_next;
         e = e_next;
     }
@@ -187,7 +187,7 @@ fn gather_at_start(s: Segment, before: vec3f, below: Bottoms, sources: Layers) -
         }
     }
     var sum: Gathered;
-    add(&sum, j, (end_of(s) - s.start) * exp(-(s.start + before)) * sources.of[j]);
+    add(&sum, j, (end_of(s) - s.start) * exp(-(s.start + before)) * sources.each[j]);
     return sum;
 }
 
@@ -200,8 +200,8 @@ fn by_layer(ray: Ray, unshadowed: f32) -> Gathered {
     let p3 = m.beam3.phases;
     var sum: Gathered;
     for (var j = 0u; j < LAYER_COUNT; j += 1u) {
-        let p = vec4f(p0.of[j], p1.of[j], p2.of[j], p3.of[j]);
-        let light = gather_layer(&m, ray, layers, layers.of[j], j, p);
+        let p = vec4f(p0.each[j], p1.each[j], p2.each[j], p3.each[j]);
+        let light = gather_layer(&m, ray, layers, layers.each[j], j, p);
         add(&sum, j, light * frame.albedo[j].xyz);
     }
     return sum;

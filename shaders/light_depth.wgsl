@@ -3,7 +3,8 @@
 //
 //   E = world_from_clip (centre of M's texel, its depth)        then as light_entry.wgsl
 //
-// Where the texel is empty M lies under the very rim of the body: the tangent plane at P stands for the surface.
+// Where the texel is empty M lies under the very rim of the body: the tangent plane at P stands for the surface, and
+// where that faces away nothing does.
 //
 // Source:  Green 2004, 16.3; François 2006, eq. 10, with the entry read in place of the estimate.
 // Units:   metres.
@@ -56,7 +57,7 @@ fn way_under(cover: Cover, facing: Facing, t: f32, blend: f32) -> vec2f {
     if depth >= 1.0 || any(inside != texel) {
         let cosine = dot(cover.normal, facing.to_light);
         let flat = vec2f(t * max(dot(cover.normal, cover.to_eye), 0.0) / max(cosine, 1e-3), cosine);
-        return select(vec2f(0.0), flat, cosine > 1e-3);
+        return select(vec2f(0.0, MIN_ENTRY_COSINE), flat, cosine > 1e-3);
     }
     let centre = (vec2f(inside) + 0.5) / f32(size) * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0);
     let far = light_views.world_from_clip[k] * vec4f(centre, depth, 1.0);

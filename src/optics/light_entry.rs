@@ -10,7 +10,7 @@ const MIN_ENTRY_COSINE: f32 = 0.05;
 /// Length [m] of the way to `at` and its cosine with the surface's normal where it enters, near `entry`, where the
 /// surface's normal is `normal`.
 ///
-/// `None` for a point that lies before the entry by more than `slack_m`: it is outside the body.
+/// `None` for a point that lies above the surface there by more than `slack_m`: it is outside the body.
 pub fn way_from_entry(
     entry: Vec3,
     normal: Vec3,
@@ -19,8 +19,8 @@ pub fn way_from_entry(
     slack_m: f32,
 ) -> Option<(f32, f32)> {
     let cosine = normal.dot(to_light).max(MIN_ENTRY_COSINE);
-    let s = (entry - at).dot(normal) / cosine;
-    (s > -slack_m).then_some((s.max(0.0), cosine))
+    let height = (entry - at).dot(normal);
+    (height > -slack_m).then_some((height.max(0.0) / cosine, cosine))
 }
 
 #[cfg(test)]

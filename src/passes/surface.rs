@@ -119,13 +119,11 @@ impl Surface {
     pub fn parts(section: &SurfaceSection, cover: CoverKind) -> Vec<Wgsl> {
         let mut parts = Self::wgsl(section.kind, cover).to_vec();
         if section.layers.len() > LAYERS {
-            let [eight] = crate::wgsl!["layers_eight.wgsl"] else {
-                unreachable!("one file was named")
-            };
+            let eight = crate::wgsl!["layers_eight.wgsl"];
             parts.retain(|part| !part.file.ends_with("/medium.wgsl"));
             for part in &mut parts {
                 if part.file.ends_with("/layers_four.wgsl") {
-                    *part = *eight;
+                    *part = eight[0];
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! What the shaders know of a frame: camera, lights, layers and knobs, as one uniform.
 
-use crate::optics::{LAYERS_MAX, Layer};
+use crate::optics::LAYERS_MAX;
 use crate::scene::{LIGHTS_MAX, PlacedLight, RestBox, Scene, SurfaceSection};
 use glam::{Mat4, Vec3};
 

@@ -5,10 +5,11 @@ use super::format::{LayerDepths, LayerFile, LightFile, SceneFile};
 use crate::geom::SurfaceMesh;
 use crate::geom::import::read_parts;
 use crate::geom::paint::TissueMaps;
+use crate::geom::plane::LightPathMethod;
 use crate::measure::npz;
-use crate::optics::LAYERS_MAX;
+use crate::optics::{LAYERS_MAX, Layer};
 use crate::passes::view::View;
-use crate::scene::{LIGHTS_MAX, LayerSection, LightSection, Scene, SceneSource};
+use crate::scene::{LIGHTS_MAX, LayerSection, LightSection, Quadrature, Scene, SceneSource};
 use glam::Vec3;
 use image::{DynamicImage, Rgba, Rgba32FImage, RgbaImage};
 use std::collections::HashMap;
@@ -87,11 +88,25 @@ impl ReferenceScene {
             sets,
         )?;
         let layers = layers(&told.layers, unit_m).map_err(wrong)?;
-        let depths =
-            depths(dir, told.layer_depths.as_ref(), layers.len(), unit_m).map_err(wrong)?;
+        let depths = depths(dir, told.layer_depths.as_ref(), layers.len()).map_err(wrong)?;
         scene.surface.layers = layers;
-        if !sets.iter().any(|set| set.contains("layer_depth_max_m")) {
-            scene.surface.layer_depth_max_m = ENDLESS_M;
+        let is_told = |key: &str| sets.iter().any(|set| set.trim_start().starts_with(key));
+        let printed = scene.surface.quadrature == Quadrature::Published;
+        let first = Layer::from(scene.surface.layers[0]).extinction_per_m();
+        if !is_told("surface.layer_depth_max_m") {
+            scene.surface.layer_depth_max_m = if printed {
+                // Where a hundredth of the light is left in the clearest colour.
+                100_f32.ln() / first.min_element()
+            } else {
+                ENDLESS_M
+            };
+        }
+        if printed && !is_told("light_path.method") {
+            scene.light_path.method = LightPathMethod::Full;
+        }
+        if !is_told("light_path.radius_m") {
+            // A tenth in the densest: smaller than the features of a scene a few millimetres wide.
+            scene.light_path.radius_m = Some(10_f32.ln() / first.max_element());
         }
         let maps = maps(&depths, scene.surface.layer_depth_max_m);
         let (low, high) = mesh.bounds();
@@ -248,12 +263,7 @@ struct Depths {
     maps: Vec<Vec<[f32; 4]>>,
 }
 
-fn depths(
-    dir: &Path,
-    told: Option<&LayerDepths>,
-    layer_count: usize,
-    unit_m: f32,
-) -> Result<Depths, String> {
+fn depths(dir: &Path, told: Option<&LayerDepths>, layer_count: usize) -> Result<Depths, String> {
     let boundaries = layer_count - 1;
     let constant = |depths_m: &[f32]| Depths {
         size: [1, 1],
@@ -293,7 +303,6 @@ fn depths(
         .map(|d| 1e-3 * d)
         .filter(|d| *d > 0.0 && d.is_finite())
         .ok_or("missing key `layer_depths.depth_max_mm`: what the value 1 stands for".to_owned())?;
-    let _ = unit_m;
     for (key, value, known) in [
         ("address", &told.address, "clamp"),
         ("filter", &told.filter, "bilinear"),
