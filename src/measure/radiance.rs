@@ -101,7 +101,7 @@ pub fn scores(picture: Picture<'_>, reference: &Reference) -> Scores {
 }
 
 /// Pixels whose four neighbours are in the mask too; those at the edge of the picture have none beyond it.
-fn eroded(mask: &[bool], [width, height]: [usize; 2]) -> Vec<bool> {
+pub fn eroded(mask: &[bool], [width, height]: [usize; 2]) -> Vec<bool> {
     (0..mask.len())
         .map(|i| {
             let (x, y) = (i % width, i / width);

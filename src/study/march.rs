@@ -15,11 +15,12 @@ use crate::geom::unwrap::unwrap;
 use crate::gpu::Gpu;
 use crate::measure::chart::three_digits;
 use crate::measure::page::{Block, Table};
+use crate::measure::radiance::eroded;
 use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
 use crate::measure::stats::Stats;
 use crate::optics::closed_form::parallel_layers;
 use crate::passes::view::View;
-use crate::scene::{LayerSection, LightSection, Quadrature, Scene};
+use crate::scene::{LayerSection, LightSection, Quadrature, Scene, SurfaceKind};
 use glam::{Vec2, Vec3};
 use image::{DynamicImage, Rgba, Rgba32FImage, RgbaImage};
 use serde::{Deserialize, Serialize};
@@ -273,7 +274,7 @@ enum Exact {
     Closed { bottoms_m: Vec<f32> },
     /// The scene with 4096 samples.
     Fine(Specimen),
-    /// A picture, and where the object is in it.
+    /// A picture, and where the object is in it, less its outermost pixels.
     Picture { rgb: Vec<f32>, mask: Vec<bool> },
 }
 
@@ -364,7 +365,7 @@ impl March {
             size: read.size,
             exact: Exact::Picture {
                 rgb: reference.rgb,
-                mask: reference.mask,
+                mask: eroded(&reference.mask, reference.size),
             },
         })
     }
@@ -391,6 +392,7 @@ fn own(specimen: Specimen, quadrature: Quadrature) -> Result<Stage, AppError> {
     };
     let mut scene = load_scene("slab", &[])?;
     let surface = &mut scene.surface;
+    surface.kind = SurfaceKind::Subsurface;
     surface.layers = table_1();
     surface.color_blend = 0.0;
     surface.multiple_scattering = 0.0;

@@ -17,7 +17,7 @@ use crate::measure::page::{Block, Table};
 use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
 use crate::measure::stats::Stats;
 use crate::passes::view::View;
-use crate::scene::{LayerSection, LightSection, Quadrature, Scene};
+use crate::scene::{LayerSection, LightSection, Quadrature, Scene, SurfaceKind};
 use glam::Vec3;
 use image::{Rgba, RgbaImage};
 use serde::{Deserialize, Serialize};
@@ -192,6 +192,7 @@ fn scene(cell: &Cell) -> Result<Scene, AppError> {
         asymmetry,
     };
     let surface = &mut scene.surface;
+    surface.kind = SurfaceKind::Subsurface;
     surface.layers = vec![
         layer([2.0, 1.0, 1.0], 0.6, 0.25),
         layer([6.0, 3.0, 2.0], 0.6, 0.40),
