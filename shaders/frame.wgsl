@@ -16,10 +16,10 @@ struct Frame {
     shadow_from_world: mat4x4f,
     eye: vec4f,
     lights: array<Light, 4>,
-    // sigma_t of each layer [1/m]; w is Schlick's k.
-    extinction: array<vec4f, 4>,
+    // sigma_t of each layer [1/m], the last one repeated; w is Schlick's k.
+    extinction: array<vec4f, 8>,
     // sigma_s / sigma_t of each layer.
-    albedo: array<vec4f, 4>,
+    albedo: array<vec4f, 8>,
     // Diffuse attenuation of light that comes through the body [1/m].
     through: vec4f,
     // Width and height of the picture [px], and their inverses.

@@ -16,11 +16,13 @@
 const MIN_ENTRY_COSINE: f32 = 0.05;
 
 // Length of the way [m] and its cosine with the surface's normal where it enters. A point that lies before the entry
-// by more than `slack_m` is outside the body: nothing scatters there, and it counts as unlit, with a cosine of 0.
+// and above the surface there by more than `slack_m` is outside the body: nothing scatters there, and it counts as
+// unlit, with a cosine of 0. Where light grazes, a hair above the surface is far before the entry.
 fn way_from_entry(entry: vec3f, normal: vec3f, at: vec3f, to_light: vec3f, slack_m: f32) -> vec2f {
     let cosine = max(dot(normal, to_light), MIN_ENTRY_COSINE);
     let way = entry - at;
     let along = dot(way, to_light);
     let s = along + dot(way - along * to_light, normal) / cosine;
-    return select(vec2f(0.0), vec2f(max(s, 0.0), cosine), s > -slack_m);
+    let below = max(s, dot(way, normal));
+    return select(vec2f(0.0), vec2f(max(s, 0.0), cosine), below > -slack_m);
 }

@@ -15,6 +15,9 @@
 // Units:   metres.
 // Fails:   light that enters far from P; folds below the radius of the patch.
 
+// 1: as printed, the absolute values of eq. 10 and no more: what faces away from the light is lit as if mirrored.
+override MIRRORED: u32 = 0u;
+
 struct PlanePair {
     // N.n, N.w_out, n.w_out
     normals: f32,
@@ -32,6 +35,9 @@ fn way_to_light(pair: PlanePair, t: f32, blend: f32, tangent_light: f32, plane_l
         + t * (rest * pair.tangent_eye + blend * pair.plane_eye);
     let facing = rest * tangent_light + blend * plane_light;
     let cosine = facing * inverseSqrt(max(squared, 1e-6));
+    if MIRRORED != 0u {
+        return vec2f(abs(height) / max(abs(facing), 1e-3), max(abs(cosine), 1e-3));
+    }
     let s = max(height, 0.0) / max(facing, 1e-3);
     return select(vec2f(0.0), vec2f(s, cosine), cosine > 1e-3);
 }
@@ -75,4 +81,9 @@ fn way_under(cover: Cover, facing: Facing, t: f32, blend: f32) -> vec2f {
 // Where the view ray leaves the body again [m]: planes do not tell.
 fn exit_of(cover: Cover) -> f32 {
     return 1e6;
+}
+
+// The cosine by which the papers' march ends: with the fitted plane.
+fn printed_cosine(cover: Cover) -> f32 {
+    return cover.pair.plane_eye;
 }

@@ -103,3 +103,8 @@ fn exit_of(cover: Cover) -> f32 {
     let exit = 2.0 * max(cover.bend.to_eye.z, 1e-3) / max(-cover.bend.eye_eye, 1e-6);
     return max(exit, 1e-6);
 }
+
+// The cosine by which the papers' march ends; they know of planes alone.
+fn printed_cosine(cover: Cover) -> f32 {
+    return cover.bend.to_eye.z;
+}

@@ -21,6 +21,9 @@
 
 const INV_FOUR_PI: f32 = 0.07957747;
 
+// Depth of the lower boundary of the first three layers, or how far something lies below each.
+alias Bottoms = vec3f;
+
 // Extinction of the four layers [1/m].
 struct Layers {
     t0: vec3f,
@@ -60,6 +63,15 @@ fn mean_transmittance(a0: vec3f, a1: vec3f, e0: vec3f, e1: vec3f) -> vec3f {
 fn above(start: vec3f, end: vec3f) -> vec3f {
     let below = max(start, vec3f(0.0)) + max(end, vec3f(0.0));
     return 1.0 - below / max(abs(start) + abs(end), vec3f(1e-12));
+}
+
+fn below_all(depth: f32, bottoms: Bottoms) -> Bottoms {
+    return depth - bottoms;
+}
+
+// The same where its start stands for all of it.
+fn above_at_start(below: Bottoms) -> Bottoms {
+    return select(vec3f(1.0), vec3f(0.0), below > vec3f(0.0));
 }
 
 // Optical depth from the eye at a segment's end and at the ends of the layers within it.

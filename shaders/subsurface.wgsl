@@ -8,7 +8,8 @@
 //
 // Each sample reads the layers once, for all lights; the light's way is split over the layers at M (their mean
 // with those at K' changes little and costs a fetch a light). The layers are tinted by the colour maps: the
-// upper two by the outer one, the lower two by the inner one.
+// upper half by the outer one, the lower half by the inner one. How many layers there are is the matter of the file
+// before it: layers_four.wgsl, or layers_eight.wgsl.
 //
 // Source:  François 2006, Algorithms 1 and 2 with the faults mended that docs/METHODS.md lists; Norberg 2010,
 //          eqs. 10, 14 and 5.1 (colour).
@@ -43,7 +44,7 @@ struct Ray {
 struct Beam {
     facing: Facing,
     irradiance: vec3f,
-    phases: vec4f,
+    phases: Phases,
     depth: vec3f,
     left: vec3f,
 }
@@ -53,48 +54,32 @@ struct March {
     t: f32,
     // Optical depth from the eye.
     a: vec3f,
-    bottoms: vec3f,
+    bottoms: Bottoms,
     beam0: Beam,
     beam1: Beam,
     beam2: Beam,
     beam3: Beam,
 }
 
-fn bottoms_at(ray: Ray, t: f32) -> vec3f {
-    let texel = textureSampleLevel(layer_map, linear_sampler, ray.uv + t * ray.drift, 0.0);
-    return ray.deepest_m * texel.rgb;
-}
-
-fn extinctions() -> Layers {
-    return Layers(
-        frame.extinction[0].xyz,
-        frame.extinction[1].xyz,
-        frame.extinction[2].xyz,
-        frame.extinction[3].xyz,
-    );
-}
-
+// As printed, a march ends where the deepest layer does below the fitted plane.
 fn reach_of(ray: Ray) -> f32 {
+    if QUADRATURE == 2u {
+        return ray.deepest_m / max(printed_cosine(ray.cover), 0.08);
+    }
     let deepest = ray.deepest_m / max(ray.cos_eye, 0.125);
     return min(min(deepest, frame.reach_m), exit_of(ray.cover));
 }
 
 // Optical depth of a way to the light; beyond any eye's reach where the plane faces away.
-fn light_depth(way: vec2f, bottoms: vec3f, layers: Layers) -> vec3f {
+fn light_depth(way: vec2f, bottoms: Bottoms, layers: Layers) -> vec3f {
     return select(vec3f(60.0), optical_depth(way.x, way.y, bottoms, layers), way.y > 0.0);
 }
 
-fn beam_start(k: u32, ray: Ray, bottoms: vec3f) -> Beam {
+fn beam_start(k: u32, ray: Ray, bottoms: Bottoms) -> Beam {
     let lit = light_at(k, ray.world);
     let facing = facing_of(ray.cover, k, lit.to_light);
-    let k_of_layers = vec4f(
-        frame.extinction[0].w,
-        frame.extinction[1].w,
-        frame.extinction[2].w,
-        frame.extinction[3].w,
-    );
     let depth = light_depth(way_under(ray.cover, facing, 0.0, 0.0), bottoms, extinctions());
-    let p = phases(dot(lit.to_light, ray.to_eye), k_of_layers);
+    let p = phases_towards(dot(lit.to_light, ray.to_eye));
     return Beam(facing, lit.irradiance, p, depth, exp(-depth));
 }
 
@@ -134,7 +119,7 @@ fn march_start(ray: Ray, unshadowed: f32) -> March {
 struct Stretch {
     t: f32,
     blend: f32,
-    bottoms: vec3f,
+    bottoms: Bottoms,
     // Optical depth from the eye at both ends.
     a0: vec3f,
     a1: vec3f,
@@ -157,27 +142,27 @@ fn follow(k: u32, ray: Ray, s: Stretch, layers: Layers, last: Beam) -> Followed 
     return Followed(next, (s.a1 - s.a0) * mean * last.irradiance);
 }
 
-// Gathers one layer of extinction `sigma` [1/m]. `pick` is 1 for the boundary at which it ends, 0 for the last
-// layer, which ends where the march does; `p` is the layer's phase function for each light. The end is looked for
-// where the last sample's layers say it is, and corrected once by what is found there.
+// Gathers one layer of extinction `sigma` [1/m]. `pick` says at which boundary it ends; the last layer ends where the
+// march does. `p` is the layer's phase function for each light. The end is looked for where the last sample's layers
+// say it is, and corrected once by what is found there. Several samples lie at (i/n)^2 of the way through the layer.
 fn gather_layer(
     m: ptr<function, March>,
     ray: Ray,
     layers: Layers,
     sigma: vec3f,
-    pick: vec3f,
+    pick: Pick,
     p: vec4f,
 ) -> vec3f {
     let n_v = max(ray.cos_eye, 1e-3);
     let reach = reach_of(ray);
-    let is_last = all(pick == vec3f(0.0));
     var sum = vec3f(0.0);
-    for (var left = PIECES; left > 0u; left -= 1u) {
-        let part = 1.0 / f32(left);
+    for (var i = 0u; i < PIECES; i += 1u) {
+        // Of what is left of the layer: ((i + 1)^2 - i^2) / (n^2 - i^2).
+        let part = f32(2u * i + 1u) / f32((PIECES - i) * (PIECES + i));
         let t = (*m).t;
-        let guess = select(clamp(dot(pick, (*m).bottoms) / n_v, t, reach), reach, is_last);
+        let guess = select(clamp(boundary(pick, (*m).bottoms) / n_v, t, reach), reach, is_last(pick));
         let bottoms = bottoms_at(ray, t + (guess - t) * part);
-        let end = select(clamp(dot(pick, bottoms) / n_v, t, reach), reach, is_last);
+        let end = select(clamp(boundary(pick, bottoms) / n_v, t, reach), reach, is_last(pick));
         let next = t + (end - t) * part;
         let share = next / reach;
         let a0 = (*m).a;
@@ -207,32 +192,14 @@ fn gather_layer(
     return sum;
 }
 
-// One sample at the end of each layer, or several evenly within each: exact for parallel layers.
-fn by_layer(ray: Ray, unshadowed: f32) -> Gathered {
-    let layers = extinctions();
-    var m = march_start(ray, unshadowed);
-    let p0 = m.beam0.phases;
-    let p1 = m.beam1.phases;
-    let p2 = m.beam2.phases;
-    let p3 = m.beam3.phases;
-    let first = gather_layer(&m, ray, layers, layers.t0, vec3f(1.0, 0.0, 0.0), vec4f(p0.x, p1.x, p2.x, p3.x));
-    let second = gather_layer(&m, ray, layers, layers.t1, vec3f(0.0, 1.0, 0.0), vec4f(p0.y, p1.y, p2.y, p3.y));
-    let third = gather_layer(&m, ray, layers, layers.t2, vec3f(0.0, 0.0, 1.0), vec4f(p0.z, p1.z, p2.z, p3.z));
-    let fourth = gather_layer(&m, ray, layers, layers.t3, vec3f(0.0), vec4f(p0.w, p1.w, p2.w, p3.w));
-    return Gathered(
-        first * frame.albedo[0].xyz + second * frame.albedo[1].xyz,
-        third * frame.albedo[2].xyz + fourth * frame.albedo[3].xyz,
-    );
-}
-
 // A step of the other two rules, which may cross layers.
 struct Step {
     t: f32,
     blend: f32,
-    bottoms: vec3f,
+    bottoms: Bottoms,
     segment: Segment,
     // How far the start of the segment lies below each boundary [m].
-    below: vec3f,
+    below: Bottoms,
 }
 
 // A beam at the end of a step, and what the step sends to the eye.
@@ -245,12 +212,7 @@ fn advance(k: u32, ray: Ray, step: Step, layers: Layers, last: Beam) -> Advanced
     var next = turned(k, ray, step.t, last);
     let way = way_under(ray.cover, next.facing, step.t, step.blend);
     next.depth = light_depth(way, step.bottoms, layers);
-    let sources = Layers(
-        last.phases.x * frame.albedo[0].xyz,
-        last.phases.y * frame.albedo[1].xyz,
-        last.phases.z * frame.albedo[2].xyz,
-        last.phases.w * frame.albedo[3].xyz,
-    );
+    let sources = sources_of(last.phases);
     var got: Gathered;
     if QUADRATURE == 2u {
         got = gather_at_start(step.segment, last.depth, step.below, sources);
@@ -268,16 +230,16 @@ fn by_step(ray: Ray, unshadowed: f32) -> Gathered {
     var m = march_start(ray, unshadowed);
     var upper = vec3f(0.0);
     var lower = vec3f(0.0);
-    var below = -m.bottoms;
+    var below = below_all(0.0, m.bottoms);
     for (var i = 1u; i <= SAMPLES; i += 1u) {
         let even = f32(i) * (1.0 / f32(SAMPLES));
         let share = select(even * even, even, QUADRATURE == 2u);
         let next = reach * share;
         let bottoms = bottoms_at(ray, next);
-        let below_next = next * n_v - bottoms;
+        let below_next = below_all(next * n_v, bottoms);
         var shares = above(below, below_next);
         if QUADRATURE == 2u {
-            shares = select(vec3f(1.0), vec3f(0.0), below > vec3f(0.0));
+            shares = above_at_start(below);
         }
         let blend = select(share * share, share, QUADRATURE == 2u);
         let step = Step(next, blend, bottoms, segment(m.a, next - m.t, shares, layers), below);
@@ -304,7 +266,7 @@ fn by_step(ray: Ray, unshadowed: f32) -> Gathered {
             lower += got.light.lower;
         }
         m.t = next;
-        m.a = step.segment.a4;
+        m.a = end_of(step.segment);
         below = below_next;
     }
     return Gathered(upper, lower);

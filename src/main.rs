@@ -2,7 +2,7 @@
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
-use palpate::app::{self, AppError, Outcome, ReplayOptions, WindowOptions};
+use palpate::app::{self, AppError, Outcome, ReplayOptions, ValidateOptions, WindowOptions};
 use palpate::study::{self, Shard, Study, StudyOptions};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -23,9 +23,10 @@ Examples:
   palpate replay liver --out out              run its script, write pictures, log and report
   palpate replay liver --set body.file='\"spleen.glb\"' --set surface.kind=gooey
   palpate study solver --quick                time against error of every method, in a minute
+  palpate validate truth --out out            radiance against reference pictures
   palpate check spleen.glb my-scene.toml      say what a file holds, or what is wrong with it
 
-Exit status: 0 done; 1 a comparison failed; 2 bad usage or bad input.";
+Exit status: 0 done; 1 a comparison or validation failed; 2 bad usage or bad input.";
 
 #[derive(Subcommand)]
 enum Command {
@@ -53,6 +54,16 @@ enum Command {
         a: PathBuf,
         /// The folder that the second one wrote.
         b: PathBuf,
+    },
+    /// Renders a folder of reference scenes, scores the pictures and checks them against its goals.
+    Validate {
+        /// Folder with scenes/*.json, and for the scores ref/*.npz and goals.json.
+        dir: PathBuf,
+        /// Folder for pictures (linear radiance, NumPy arrays), scores and report.
+        #[arg(long, value_name = "DIR", default_value = "out/validate")]
+        out: PathBuf,
+        #[command(flatten)]
+        sets: Sets,
     },
     /// Reads scenes, meshes and pictures; says what they hold or what is wrong.
     Check {
@@ -194,6 +205,11 @@ fn run(command: Option<Command>) -> Result<Outcome, AppError> {
         }),
         Some(Command::Study(arguments)) => run_study(arguments),
         Some(Command::Compare { a, b }) => app::compare(&a, &b),
+        Some(Command::Validate { dir, out, sets }) => app::validate(&ValidateOptions {
+            dir,
+            out,
+            sets: sets.set,
+        }),
         Some(Command::Check { files }) => app::check(&files),
         Some(Command::Scenes) => app::list_scenes(),
     }

@@ -10,14 +10,16 @@ mod surfaces;
 use glam::{Mat4, Vec3, Vec4};
 use palpate::geom::SurfaceMesh;
 use palpate::geom::ray::first_hit;
-use palpate::gpu::{Gpu, Timer, join, read_texture_depth, read_texture_rgba8};
+use palpate::gpu::{Gpu, Timer, join, read_texture_depth, read_texture_rgba8, uniform};
 use palpate::optics::light_entry::way_from_entry;
 use palpate::optics::pack::from_octahedral;
 use palpate::passes::depth_maps::{DepthMaps, LightViews, views};
+use palpate::passes::exit::Exit;
 use palpate::passes::mesh_buffers::MeshBuffers;
 use palpate::passes::shadow::SIZE_PX;
 use palpate::passes::tangents::Tangents;
-use palpate::scene::PlacedLight;
+use palpate::passes::view::{FrameUniform, View};
+use palpate::scene::{PlacedLight, SurfaceSection};
 
 fn gpu() -> Gpu {
     Gpu::headless().expect("a GPU adapter; a software one (mesa-vulkan-drivers) will do")
@@ -192,4 +194,63 @@ fn ways_read_from_depth_maps_are_the_chords_of_a_sphere() {
         // entries taken as they are, without the cut by their plane, err by as much.
         assert!(error < 1e-4, "light {k}: {error} m");
     }
+}
+
+/// Worst distance from a ball's far side of where view rays are said to leave it, over its radius; the rim, where a
+/// ray cuts off less than a tenth of the radius, is left out.
+fn exit_error(gpu: &Gpu, pass_of: impl Fn(&wgpu::Buffer, &SurfaceMesh) -> Exit) -> f32 {
+    let (radius, side) = (0.05, 64);
+    let mesh = surfaces::sphere(radius, 160, 101);
+    let view = View {
+        eye: Vec3::new(0.02, 0.05, 0.2),
+        target: Vec3::ZERO,
+        up: Vec3::Y,
+        fov_y: 0.5,
+    };
+    let section = SurfaceSection::default();
+    let frame = FrameUniform::new(&view, [side; 2], &lights(), &section, Mat4::IDENTITY, 1.0);
+    let frame = uniform(gpu, "frame", &frame);
+    let pass = pass_of(&frame, &mesh);
+    let buffers = MeshBuffers::new(gpu, &mesh).expect("the surface fits");
+    let mut encoder = gpu.encoder();
+    pass.record(&buffers, &mut encoder, &mut Timer::new(gpu, 1));
+    gpu.submit_and_wait(encoder);
+    let depth = read_texture_depth(gpu, &pass.target.texture).expect("can be read");
+    let world_from_clip = view.clip_from_world(1.0).inverse();
+    let mut worst = 0.0_f32;
+    let mut met = 0;
+    for (i, &depth) in (0..side * side).zip(&depth) {
+        let x = ((i % side) as f32 + 0.5) / side as f32 * 2.0 - 1.0;
+        let y = 1.0 - ((i / side) as f32 + 0.5) / side as f32 * 2.0;
+        let along = (world_from_clip.project_point3(Vec3::new(x, y, 0.5)) - view.eye).normalize();
+        let nearest = -view.eye.dot(along);
+        let half = radius * radius - view.eye.length_squared() + nearest * nearest;
+        if half > (0.05 * radius).powi(2) {
+            let exit = view.eye + (nearest + half.sqrt()) * along;
+            let told = world_from_clip.project_point3(Vec3::new(x, y, depth));
+            worst = worst.max(told.distance(exit) / radius);
+            met += 1;
+        }
+    }
+    assert!(met > 500, "rays meet the ball");
+    worst
+}
+
+#[test]
+fn view_rays_end_at_the_far_side_of_a_ball() {
+    let gpu = gpu();
+    let error = exit_error(&gpu, |frame, mesh| {
+        Exit::new(&gpu, mesh, frame, [64; 2]).expect("the pass is built")
+    });
+    // Triangles lie 5e-4 of the radius below the ball, and rays meet them at down to 3 degrees.
+    assert!(error < 0.02, "{error} of the radius");
+    // Turned inside out, the near side is drawn.
+    let near = exit_error(&gpu, |frame, mesh| {
+        let mut mesh = mesh.clone();
+        for corners in &mut mesh.triangles {
+            corners.swap(1, 2);
+        }
+        Exit::new(&gpu, &mesh, frame, [64; 2]).expect("the pass is built")
+    });
+    assert!(near > 1.0, "the near side went unnoticed: {near}");
 }

@@ -5,6 +5,7 @@
 use palpate::geom::moments::PatchSums;
 use palpate::gpu::{Wgsl, join};
 use palpate::passes::depth_maps::{DepthMaps, LightViews};
+use palpate::passes::exit::Exit;
 use palpate::passes::geometry::Geometry;
 use palpate::passes::light_path::CoverKind;
 use palpate::passes::lightmap::{BlurUniform, LightMap};
@@ -19,7 +20,7 @@ use palpate::passes::tangents::{NormalsParams, Tangents, TangentsParams};
 use palpate::passes::tonemap::ToneMap;
 use palpate::passes::tools::{Tools, ToolsView};
 use palpate::passes::view::{FrameUniform, LightUniform};
-use palpate::scene::SurfaceKind;
+use palpate::scene::{SurfaceKind, SurfaceSection};
 use std::collections::BTreeSet;
 use std::mem::offset_of;
 
@@ -53,6 +54,8 @@ fn shaders() -> Vec<(&'static str, &'static [Wgsl])> {
             Surface::wgsl(SurfaceKind::Subsurface, CoverKind::Quadrics),
         ),
         ("depth maps", DepthMaps::WGSL),
+        ("exit", Exit::WGSL),
+        ("subsurface through eight layers", through_eight_layers()),
         (
             "subsurface below depth maps",
             Surface::wgsl(SurfaceKind::Subsurface, CoverKind::DepthMaps),
@@ -64,6 +67,13 @@ fn shaders() -> Vec<(&'static str, &'static [Wgsl])> {
         ("tone map", ToneMap::WGSL),
         ("tools", Tools::WGSL),
     ]
+}
+
+/// The files are chosen by the scene, so the list lives as long as the test.
+fn through_eight_layers() -> &'static [Wgsl] {
+    let mut section = SurfaceSection::default();
+    section.layers = vec![section.layers[0]; 8];
+    Surface::parts(&section, CoverKind::DepthMaps).leak()
 }
 
 /// A Rust struct that mirrors a WGSL one.

@@ -12,8 +12,8 @@ use palpate::gpu::{
 use palpate::optics::light_entry;
 use palpate::optics::light_plane::{PlanePair, way_to_light};
 use palpate::optics::light_quadric::{self, Aim, Bend};
-use palpate::optics::march::{Cover, Ray, Rule, march, reach_m};
-use palpate::optics::{Layer, blur, film, layers, medium, pack, tone};
+use palpate::optics::march::{Cover, Ray, Rule, march, printed_reach_m, reach_m};
+use palpate::optics::{Layer, blur, film, layers, medium, pack, stack, tone};
 use palpate::passes::draw::Target;
 use palpate::passes::frame::FramePasses;
 use palpate::passes::light_path::CoverKind;
@@ -434,7 +434,7 @@ fn entry_parity_check_rejects_a_cut_across_the_light_and_a_lost_slack() {
     let source = join(wgsl!["light_entry.wgsl"]);
     for (from, to) in [
         ("dot(way - along * to_light, normal) / cosine", "0.0"),
-        ("s > -slack_m", "s > 0.0"),
+        ("below > -slack_m", "below > 0.0"),
     ] {
         assert!(
             entry_difference(&gpu, &sabotaged(&source, from, to)) > 0.1,
@@ -718,7 +718,12 @@ fn march_difference(gpu: &Gpu, source: &str, cover: CoverKind, rule: Rule, sampl
         Rule::ClosedForm => 1,
         Rule::Published => 2,
     };
+    let mirrored = format!(
+        "const MIRRORED: u32 = {}u;",
+        u32::from(rule == Rule::Published)
+    );
     let source = source
+        .replace("override MIRRORED: u32 = 0u;", &mirrored)
         .replace(
             "override QUADRATURE: u32 = 0u;",
             &format!("const QUADRATURE: u32 = {quadrature}u;"),
@@ -849,7 +854,7 @@ fn twin_of_march(
 ) -> Vec4 {
     let [normal, plane_normal, to_eye, tangent] =
         [normal, plane, to_eye, tangent].map(|v| v.truncate());
-    let layers: [Layer; 4] = section.layers.map(Layer::from);
+    let layers: [Layer; 4] = std::array::from_fn(|j| section.layers[j].into());
     let clearest = layers
         .iter()
         .map(|layer| layer.extinction_per_m().min_element())
@@ -880,15 +885,15 @@ fn twin_of_march(
             },
         },
     };
-    let reach = reach_m(
-        section.layer_depth_max_m,
-        normal.dot(to_eye),
-        8.0 / clearest,
-    );
+    let deepest_m = section.layer_depth_max_m;
+    let reach_m = match rule {
+        Rule::Published => printed_reach_m(deepest_m, &cover),
+        _ => reach_m(deepest_m, normal.dot(to_eye), 8.0 / clearest).min(cover.exit_m()),
+    };
     let ray = Ray {
         cover,
         light_eye: to_light.dot(to_eye),
-        reach_m: reach.min(cover.exit_m()),
+        reach_m,
     };
     let [r, g, b, _] = BOUNDARIES.map(|byte| section.layer_depth_max_m * f32::from(byte) / 255.0);
     march(&ray, &layers, |_| Vec3::new(r, g, b), samples, rule).extend(0.0)
@@ -943,6 +948,187 @@ fn march_parity_check_rejects_a_march_that_goes_on_outside_the_body() {
     assert!(difference > 0.02, "an exit went unnoticed: {difference}");
 }
 
+/// Worst difference of the march through eight layers of two maps from its twin, relative to the brightest case.
+fn eight_layers_difference(gpu: &Gpu, source: &str, rule: Rule, samples: u32) -> f32 {
+    const BYTES: [u8; 8] = [20, 45, 70, 100, 130, 165, 205, 255];
+    let mut section = section();
+    section.layers = (0..8)
+        .map(|j| {
+            let mut layer = SurfaceSection::default().layers[j % 4];
+            layer.asymmetry = 0.1 * j as f32 - 0.3;
+            layer.scattering_per_m[j % 3] += 900.0;
+            layer
+        })
+        .collect();
+    let to_light = Vec3::new(0.3, 0.5, 0.8).normalize();
+    let view = View {
+        up: Vec3::Y,
+        eye: Vec3::Z,
+        target: Vec3::ZERO,
+        fov_y: 0.5,
+    };
+    let lights = [far_light(to_light)];
+    let frame = FrameUniform::new(&view, [64; 2], &lights, &section, glam::Mat4::IDENTITY, 1.0);
+    let quadrature = match rule {
+        Rule::ByLayer => 0,
+        Rule::ClosedForm => 1,
+        Rule::Published => 2,
+    };
+    let set = |source: String, name: &str, was: u32, value: u32| {
+        let from = format!("override {name}: u32 = {was}u;");
+        sabotaged(&source, &from, &format!("const {name}: u32 = {value}u;"))
+    };
+    let source = set(source.to_owned(), "QUADRATURE", 0, quadrature);
+    let source = set(source, "SAMPLES", 4, samples);
+    let source = set(source, "PIECES", 1, samples.div_ceil(8));
+    let source = set(source, "MIRRORED", 0, u32::from(rule == Rule::Published));
+    let kernel = format!(
+        "{source}
+        @group(0) @binding(11) var<storage, read> cases: array<vec4f>;
+        @group(0) @binding(12) var<storage, read_write> results: array<vec4f>;
+        @compute @workgroup_size(64)
+        fn main(@builtin(global_invocation_id) id: vec3u) {{
+            let i = id.x;
+            if i >= arrayLength(&results) {{ return; }}
+            let normal = cases[2u * i].xyz;
+            let to_eye = cases[2u * i + 1u].xyz;
+            let cosine = dot(normal, to_eye);
+            let cover = Cover(normal, normal, PlanePair(1.0, cosine, cosine, 0.0));
+            let ray = Ray(vec3f(0.0), to_eye, cosine, cover, vec2f(0.5), vec2f(0.0), frame.layer_depth_max_m);
+            let got = single_scattering(ray, 1.0);
+            results[i] = vec4f(got.upper + got.lower, 0.0);
+        }}"
+    );
+    let mut numbers = Numbers(7);
+    let cases: Vec<[Vec4; 2]> = (0..256)
+        .map(|_| {
+            let normal = (to_light + 0.8 * numbers.direction()).normalize();
+            let to_eye = (normal + 0.8 * numbers.direction()).normalize();
+            [normal.extend(0.0), to_eye.extend(0.0)]
+        })
+        .collect();
+    let layers: Vec<Layer> = section.layers.iter().map(|&layer| layer.into()).collect();
+    let clearest = layers
+        .iter()
+        .map(|layer| layer.extinction_per_m().min_element())
+        .fold(f32::INFINITY, f32::min);
+    let deepest_m = section.layer_depth_max_m;
+    let bottoms = BYTES.map(|byte| deepest_m * f32::from(byte) / 255.0);
+    let twin: Vec<Vec4> = cases
+        .iter()
+        .map(|[normal, to_eye]| {
+            let (normal, to_eye) = (normal.truncate(), to_eye.truncate());
+            let cos_light = normal.dot(to_light);
+            let cover = Cover::Planes {
+                pair: PlanePair::tangent(normal.dot(to_eye)),
+                tangent_light: cos_light,
+                plane_light: cos_light,
+            };
+            let ray = Ray {
+                cover,
+                light_eye: to_light.dot(to_eye),
+                reach_m: match rule {
+                    Rule::Published => printed_reach_m(deepest_m, &cover),
+                    _ => reach_m(deepest_m, normal.dot(to_eye), 8.0 / clearest),
+                },
+            };
+            stack::march(&ray, &layers, |_| bottoms.to_vec(), samples, rule).extend(0.0)
+        })
+        .collect();
+    let map = |bytes: &[u8]| {
+        let image = Target::new(gpu, "layers", [4; 2], wgpu::TextureFormat::Rgba8Unorm);
+        gpu.queue.write_texture(
+            image.texture.as_image_copy(),
+            &bytes.repeat(16),
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(16),
+                rows_per_image: None,
+            },
+            image.texture.size(),
+        );
+        image
+    };
+    let [upper, lower] = [map(&BYTES[..4]), map(&BYTES[4..])];
+    let words = Target::new(gpu, "no words", [1; 2], wgpu::TextureFormat::Rgba32Uint);
+    let depth = Target::new(gpu, "no depth", [1; 2], wgpu::TextureFormat::Depth32Float);
+    let sampler = gpu
+        .device
+        .create_sampler(&wgpu::SamplerDescriptor::default());
+    let cases_buffer = storage(gpu, "cases", &cases).unwrap();
+    let results = storage(gpu, "results", &vec![Vec4::ZERO; cases.len()]).unwrap();
+    let kernel = Kernel::new(
+        gpu,
+        "eight layers",
+        &[],
+        &kernel,
+        "main",
+        &[
+            Binding::Uniform(&uniform(gpu, "frame", &frame)),
+            Binding::Integers(&words.view),
+            Binding::Integers(&words.view),
+            Binding::Depth(&depth.view),
+            Binding::Sampler(&sampler),
+            Binding::Texture(&upper.view),
+            Binding::Texture(&upper.view),
+            Binding::Texture(&upper.view),
+            Binding::Texture(&upper.view),
+            Binding::Texture(&upper.view),
+            Binding::Depth(&depth.view),
+            Binding::Read(&cases_buffer),
+            Binding::Write(&results),
+            Binding::Depth(&depth.view),
+            Binding::Texture(&lower.view),
+        ],
+    )
+    .unwrap();
+    dispatch(gpu, &kernel, cases.len());
+    let brightest = twin.iter().map(|v| v.max_element()).fold(0.0, f32::max);
+    worst(
+        &read_buffer(gpu, &results).unwrap(),
+        &twin,
+        0.01 * brightest,
+    )
+}
+
+fn eight_layers() -> String {
+    let mut section = section();
+    section.layers = vec![section.layers[0]; 8];
+    join(&Surface::parts(&section, CoverKind::Planes))
+}
+
+#[test]
+fn eight_layers_match_the_cpu_twin() {
+    let gpu = gpu();
+    for (rule, samples) in [
+        (Rule::ByLayer, 8),
+        (Rule::ByLayer, 16),
+        (Rule::ClosedForm, 9),
+        (Rule::Published, 23),
+    ] {
+        let difference = eight_layers_difference(&gpu, &eight_layers(), rule, samples);
+        // As for four layers.
+        assert!(
+            difference < 2e-3,
+            "{rule:?} with {samples}: differ by {difference}"
+        );
+    }
+}
+
+#[test]
+fn eight_layers_parity_check_rejects_a_second_map_that_is_not_read() {
+    let source = sabotaged(
+        &eight_layers(),
+        "textureSampleLevel(deep_layer_map,",
+        "textureSampleLevel(layer_map,",
+    );
+    let difference = eight_layers_difference(&gpu(), &source, Rule::ByLayer, 8);
+    assert!(
+        difference > 0.02,
+        "the first map twice went unnoticed: {difference}"
+    );
+}
+
 // Whole frames.
 
 /// Radiance of a lit ball, drawn small, and whether each pixel is covered.
@@ -955,7 +1141,7 @@ fn ball(gpu: &Gpu, kind: &str, sets: &[&str], light: &str) -> Vec<Vec4> {
         outer: map([170, 80, 60, 128]),
         normal: map([128, 128, 255, 255]),
         inner: map([140, 40, 30, 255]),
-        layers: map(BOUNDARIES),
+        layers: vec![map(BOUNDARIES).into()],
     };
     let text = format!(
         "[body]\nshape = \"sphere\"\nextent_m = [0.1, 0.1, 0.1]\n[surface]\nkind = \"{kind}\"\n\

@@ -52,7 +52,7 @@ fn draw(gpu: &Gpu, sets: &[&str], stretch: Vec3) -> Seen {
         outer: map([170, 80, 60, 128]),
         normal: map([128, 128, 255, 255]),
         inner: map([140, 40, 30, 255]),
-        layers: map([26, 51, 128, 255]),
+        layers: vec![map([26, 51, 128, 255]).into()],
     };
     let text = "[body]\nshape = \"slab\"\nextent_m = [0.1, 0.1, 0.01]\n[[light]]\ntoward = [0.0, 0.0, 1.0]\n\
                 irradiance_w_m2 = [3.0, 3.0, 3.0]\n";

@@ -10,8 +10,8 @@ use crate::geom::{Embedding, SurfaceMesh, TetMesh, bounds};
 use crate::scene::{BodySection, MapFiles, RestBox, Scene, SceneSource, Shape};
 use crate::sim::BodySetup;
 use glam::Vec3;
-use image::RgbaImage;
-use std::path::Path;
+use image::DynamicImage;
+use std::path::{Path, PathBuf};
 
 /// Finest cells of a graded slab that says nothing of them, as a share of its height: about 15,000
 /// tetrahedra.
@@ -169,11 +169,11 @@ pub fn maps(section: &BodySection, mesh: &SurfaceMesh) -> Result<TissueMaps, App
     else {
         return Ok(paint(mesh, section.tissue, section.map_size_px));
     };
-    let outer = picture(outer)?;
+    let outer = picture(outer)?.into_rgba8();
     let size_px = outer.width();
-    let same_size = |path: &Path| -> Result<RgbaImage, AppError> {
+    let same_size = |path: &PathBuf| -> Result<DynamicImage, AppError> {
         let image = picture(path)?;
-        if image.dimensions() == (size_px, size_px) {
+        if (image.width(), image.height()) == (size_px, size_px) {
             Ok(image)
         } else {
             Err(AppError::Map {
@@ -188,14 +188,15 @@ pub fn maps(section: &BodySection, mesh: &SurfaceMesh) -> Result<TissueMaps, App
     };
     Ok(TissueMaps {
         size_px,
-        normal: same_size(normal)?,
-        inner: same_size(inner)?,
-        layers: same_size(layers)?,
+        normal: same_size(normal)?.into_rgba8(),
+        inner: same_size(inner)?.into_rgba8(),
+        layers: layers.iter().map(same_size).collect::<Result<_, _>>()?,
         outer,
     })
 }
 
-fn picture(path: &Path) -> Result<RgbaImage, AppError> {
+/// A picture with as many bits a channel as the file has.
+pub(super) fn picture(path: &Path) -> Result<DynamicImage, AppError> {
     let wrong = |message: String| AppError::Map {
         path: path.display().to_string(),
         message,
@@ -204,10 +205,7 @@ fn picture(path: &Path) -> Result<RgbaImage, AppError> {
     let reader = image::ImageReader::new(std::io::Cursor::new(&bytes))
         .with_guessed_format()
         .map_err(|e| wrong(e.to_string()))?;
-    Ok(reader
-        .decode()
-        .map_err(|e| wrong(e.to_string()))?
-        .to_rgba8())
+    reader.decode().map_err(|e| wrong(e.to_string()))
 }
 
 /// The tetrahedra of `file`, scaled, with their own skin as surface.

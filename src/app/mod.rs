@@ -17,7 +17,9 @@ mod renderer;
 mod replay;
 mod script;
 mod session;
+mod still;
 mod take;
+mod validate;
 mod window;
 
 pub use assets::DEFAULT_SCENE;
@@ -28,6 +30,8 @@ pub use record::start_clock;
 pub use renderer::Renderer;
 pub use replay::{ReplayOptions, replay};
 pub use session::{Marker, Session, Tick};
+pub use still::Still;
+pub use validate::{ReferenceScene, ValidateOptions, folder_scenes, read_reference, validate};
 pub use window::{WindowOptions, window};
 
 use crate::measure::versus::{TimedRun, told};

@@ -15,7 +15,7 @@ use super::SurfaceMesh;
 use super::organ::{Features, Organ};
 use canvas::Canvas;
 use glam::Vec3;
-use image::{Rgba, RgbaImage};
+use image::{DynamicImage, Rgba, RgbaImage};
 use rayon::prelude::*;
 
 /// What a surface is painted as.
@@ -66,9 +66,9 @@ pub struct TissueMaps {
     /// Deep tissue: sRGB colour. Alpha is 255.
     pub inner: RgbaImage,
     /// Depth of the lower boundary of layers 1 to 4 as a share of the deepest depth, linear,
-    /// red ≤ green ≤ blue ≤ alpha. Layer 1 is the capsule, layer 3 holds the vessels: thick
-    /// where one runs, thin elsewhere.
-    pub layers: RgbaImage,
+    /// red ≤ green ≤ blue ≤ alpha; of layers 5 to 8 in a second picture. Eight bits a channel, or more. Of what is
+    /// painted layer 1 is the capsule, layer 3 holds the vessels: thick where one runs, thin elsewhere.
+    pub layers: Vec<DynamicImage>,
 }
 
 /// Width of the painted border round each chart [px].
@@ -188,7 +188,7 @@ fn maps(size_px: u32, dabs: &[Option<Dab>], normals: &[Vec3]) -> TissueMaps {
                 .to_array()
         }),
         inner: image(5.0, &|dab, _| dab.inner.extend(1.0).to_array()),
-        layers: image(5.0, &|dab, _| dab.depths),
+        layers: vec![DynamicImage::ImageRgba8(image(5.0, &|dab, _| dab.depths))],
     }
 }
 
@@ -288,7 +288,7 @@ mod tests {
         let mesh = ball();
         for tissue in Tissue::ALL {
             let maps = paint(&mesh, tissue, 128);
-            for Rgba(depths) in maps.layers.pixels() {
+            for Rgba(depths) in maps.layers[0].to_rgba8().pixels() {
                 assert!(depths.is_sorted() && depths[0] > 0, "{depths:?}");
             }
         }

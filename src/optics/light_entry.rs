@@ -10,7 +10,8 @@ const MIN_ENTRY_COSINE: f32 = 0.05;
 /// Length [m] of the way to `at` and its cosine with the surface's normal where it enters, near `entry`, where the
 /// surface's normal is `normal`.
 ///
-/// `None` for a point that lies before the entry by more than `slack_m`: it is outside the body.
+/// `None` for a point that lies before the entry and above the surface there by more than `slack_m`: it is outside
+/// the body.
 pub fn way_from_entry(
     entry: Vec3,
     normal: Vec3,
@@ -22,7 +23,8 @@ pub fn way_from_entry(
     let way = entry - at;
     let along = way.dot(to_light);
     let s = along + (way - along * to_light).dot(normal) / cosine;
-    (s > -slack_m).then_some((s.max(0.0), cosine))
+    let below = s.max(way.dot(normal));
+    (below > -slack_m).then_some((s.max(0.0), cosine))
 }
 
 #[cfg(test)]

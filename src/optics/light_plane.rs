@@ -48,6 +48,29 @@ pub fn way_to_light(
     (cosine > 1e-3).then(|| (height.max(0.0) / facing.max(1e-3), cosine))
 }
 
+/// The same as François' eq. 10 prints it: absolute values, and so no plane that faces away. The shader has it where
+/// `MIRRORED` is set.
+///
+/// Norberg's eq. 11 drops the value bars of the denominator; then ways are negative and light grows on them.
+pub fn way_as_printed(
+    pair: &PlanePair,
+    t: f32,
+    blend: f32,
+    tangent_light: f32,
+    plane_light: f32,
+) -> (f32, f32) {
+    let rest = 1.0 - blend;
+    let squared = rest * rest + blend * blend + 2.0 * rest * blend * pair.normals;
+    let height = blend * pair.offset_m * (rest * pair.normals + blend)
+        + t * (rest * pair.tangent_eye + blend * pair.plane_eye);
+    let facing = rest * tangent_light + blend * plane_light;
+    let cosine = facing / squared.max(1e-6).sqrt();
+    (
+        height.abs() / facing.abs().max(1e-3),
+        cosine.abs().max(1e-3),
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -75,6 +98,15 @@ mod tests {
         // 3 mm with a rounding of 1e-7.
         assert!((entry - on_plane).dot(blended).abs() < 1e-8);
         assert!((cosine - blended.normalize().dot(to_light)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn as_printed_a_body_lit_from_behind_is_as_bright_as_one_lit_from_the_front() {
+        let pair = PlanePair::tangent(0.8);
+        let front = way_as_printed(&pair, 0.002, 0.3, 0.6, 0.6);
+        let back = way_as_printed(&pair, 0.002, 0.3, -0.6, -0.6);
+        assert_eq!(front, back);
+        assert_eq!(Some(front), way_to_light(&pair, 0.002, 0.3, 0.6, 0.6));
     }
 
     #[test]

@@ -54,6 +54,32 @@ impl Cover {
         }
     }
 
+    /// The same as the papers print it: a plane that faces away lets light through as if it were mirrored.
+    pub fn way_as_printed(&self, t: f32, blend: f32) -> Option<(f32, f32)> {
+        match self {
+            Self::Planes {
+                pair,
+                tangent_light,
+                plane_light,
+            } => Some(light_plane::way_as_printed(
+                pair,
+                t,
+                blend,
+                *tangent_light,
+                *plane_light,
+            )),
+            Self::Quadric { .. } => self.way_to_light(t, blend),
+        }
+    }
+
+    /// The cosine by which the papers' march ends: with the fitted plane.
+    pub fn printed_cosine(&self) -> f32 {
+        match self {
+            Self::Planes { pair, .. } => pair.plane_eye,
+            Self::Quadric { bend, .. } => bend.to_eye.z,
+        }
+    }
+
     /// Where the view ray leaves the body again [m], as far as the cover tells.
     pub fn exit_m(&self) -> f32 {
         match self {
@@ -92,6 +118,12 @@ pub fn reach_m(deepest_m: f32, cos_eye: f32, optical_reach_m: f32) -> f32 {
     (deepest_m / cos_eye.max(0.125)).min(optical_reach_m)
 }
 
+/// How far the papers' march goes [m]: to the deepest layer below the fitted plane (François 2006, eq. 15); where that
+/// is seen from the side or from behind, as if by a cosine of 0.08.
+pub fn printed_reach_m(deepest_m: f32, cover: &Cover) -> f32 {
+    deepest_m / cover.printed_cosine().max(0.08)
+}
+
 /// Radiance per irradiance on a plane facing the light [1/sr], with `samples` evaluations of the light below P.
 ///
 /// `bottoms` gives the lower boundaries of the first three layers [m], ascending, at a distance along the ray.
@@ -124,12 +156,14 @@ impl Tissue {
         }
     }
 
-    fn light_depth(&self, ray: &Ray, t: f32, blend: f32, bottoms: Vec3) -> Vec3 {
-        ray.cover
-            .way_to_light(t, blend)
-            .map_or(Vec3::splat(UNLIT), |(s, cosine)| {
-                optical_depth(s, cosine, bottoms, &self.extinction)
-            })
+    fn light_depth(&self, ray: &Ray, t: f32, blend: f32, bottoms: Vec3, rule: Rule) -> Vec3 {
+        let way = match rule {
+            Rule::Published => ray.cover.way_as_printed(t, blend),
+            Rule::ClosedForm | Rule::ByLayer => ray.cover.way_to_light(t, blend),
+        };
+        way.map_or(Vec3::splat(UNLIT), |(s, cosine)| {
+            optical_depth(s, cosine, bottoms, &self.extinction)
+        })
     }
 }
 
@@ -146,15 +180,16 @@ fn by_layer(ray: &Ray, tissue: &Tissue, bottoms: impl Fn(f32) -> Vec3, pieces: u
     let mut t = 0.0;
     let mut a = Vec3::ZERO;
     let mut found = bottoms(0.0);
-    let mut depth = tissue.light_depth(ray, 0.0, 0.0, bottoms(0.0));
+    let mut depth = tissue.light_depth(ray, 0.0, 0.0, bottoms(0.0), Rule::ByLayer);
     let mut sum = Vec3::ZERO;
     for layer in 0..LAYERS {
-        for left in (1..=pieces).rev() {
-            let part = 1.0 / left as f32;
+        for i in 0..pieces {
+            // Of what is left of the layer, so that samples lie at (i/n)² of the way through it.
+            let part = (2 * i + 1) as f32 / ((pieces - i) * (pieces + i)) as f32;
             found = bottoms(t + (end(layer, t, found) - t) * part);
             let next = t + (end(layer, t, found) - t) * part;
             let share = next / ray.reach_m;
-            let depth_next = tissue.light_depth(ray, next, share * share, found);
+            let depth_next = tissue.light_depth(ray, next, share * share, found, Rule::ByLayer);
             let a_next = a + (next - t) * tissue.extinction[layer];
             let mean = mean_transmittance(a + depth, a_next + depth_next);
             sum += (a_next - a) * mean * tissue.sources[layer];
@@ -176,7 +211,7 @@ fn by_step(
     let mut t = 0.0;
     let mut a = Vec3::ZERO;
     let mut below = -bottoms(0.0);
-    let mut depth = tissue.light_depth(ray, 0.0, 0.0, bottoms(0.0));
+    let mut depth = tissue.light_depth(ray, 0.0, 0.0, bottoms(0.0), rule);
     let mut sum = Vec3::ZERO;
     for i in 1..=samples {
         let even = i as f32 / samples as f32;
@@ -185,7 +220,7 @@ fn by_step(
         let next = ray.reach_m * share;
         let found = bottoms(next);
         let below_next = next * cos_eye - found;
-        let depth_next = tissue.light_depth(ray, next, blend, found);
+        let depth_next = tissue.light_depth(ray, next, blend, found, rule);
         let shares = if is_published {
             below.map(|b| if b > 0.0 { 0.0 } else { 1.0 })
         } else {

@@ -12,12 +12,16 @@ pub mod light_quadric;
 pub mod march;
 pub mod medium;
 pub mod pack;
+pub mod stack;
 pub mod tone;
 
 use glam::Vec3;
 
 /// Layers that one RGBA texture holds.
 pub const LAYERS: usize = 4;
+
+/// Layers that the shaders have room for: of two textures.
+pub const LAYERS_MAX: usize = 8;
 
 /// One layer of tissue; red, green, blue.
 #[derive(Clone, Copy, Debug, PartialEq)]

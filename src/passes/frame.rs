@@ -2,6 +2,7 @@
 
 use super::depth_maps::DepthMaps;
 use super::draw::Target;
+use super::exit::Exit;
 use super::geometry::{Geometry, GeometryTargets};
 use super::light_path::{LightPath, LightPathKnobs, RefitCounts, patch_share};
 use super::lightmap::{LightMap, uv_per_m};
@@ -71,6 +72,7 @@ impl FramePlan {
                 method == Some(LightPathMethod::Quadric),
             ),
             (DepthMaps::NAME, scene.lights.len() as u32, by_depth),
+            (Exit::NAME, 1, by_depth),
             (Shadow::NAME, 1, shadow && !by_depth),
             (LightMap::NAME, 1, gooey),
             (LightMap::BLUR_NAME, blurs, gooey && blurs > 0),
@@ -134,6 +136,7 @@ pub struct FramePasses {
     pub picture: Target,
     shadow: Option<Shadow>,
     depth_maps: Option<DepthMaps>,
+    exit: Option<Exit>,
     light_map: Option<LightMap>,
     geometry: Geometry,
     surface: Surface,
@@ -241,6 +244,11 @@ impl FramePasses {
             "frame",
             &FrameUniform::new(&view, size, &lights, &scene.surface, Mat4::IDENTITY, 1.0),
         );
+        let exit = if depth_maps.is_some() {
+            Some(Exit::new(gpu, surface_mesh, &frame, size)?)
+        } else {
+            None
+        };
         let constants = light_constants(&lights);
         let maps = Maps::new(gpu, tissue);
         let no_shadow = Target::new(gpu, "no shadow", [1; 2], DEPTH_FORMAT);
@@ -280,6 +288,7 @@ impl FramePasses {
                 maps: &maps,
                 light_map: light_map.as_ref().map_or(&maps.outer, LightMap::view),
                 shadow_map: &shadow_map.view,
+                exit_map: &exit.as_ref().map_or(shadow_map, |exit| &exit.target).view,
                 depth_maps: depth_maps.as_ref(),
             },
         )?;
@@ -295,6 +304,7 @@ impl FramePasses {
             targets,
             shadow,
             depth_maps,
+            exit,
             light_map,
             geometry,
             surface,
@@ -323,6 +333,9 @@ impl FramePasses {
         self.radiance = Target::new(gpu, "radiance", size, RADIANCE_FORMAT);
         self.picture = Target::new(gpu, "picture", size, PICTURE_FORMAT);
         self.targets = GeometryTargets::new(gpu, self.knobs.kind, size);
+        if let Some(exit) = &mut self.exit {
+            exit.resize(gpu, size);
+        }
         let depth_maps = self.depth_maps.as_ref();
         let shadow_map = shadow_map(self.shadow.as_ref(), depth_maps, &self.no_shadow);
         self.surface.rebind(
@@ -338,6 +351,11 @@ impl FramePasses {
                     .as_ref()
                     .map_or(&self.maps.outer, LightMap::view),
                 shadow_map: &shadow_map.view,
+                exit_map: &self
+                    .exit
+                    .as_ref()
+                    .map_or(shadow_map, |exit| &exit.target)
+                    .view,
                 depth_maps,
             },
         );
@@ -398,6 +416,10 @@ impl FramePasses {
         // Where each light enters.
         if let Some(maps) = &self.depth_maps {
             maps.record(gpu, &self.lights, points, &self.mesh, encoder, timer);
+        }
+        // Where the eye's rays leave.
+        if let Some(exit) = &self.exit {
+            exit.record(&self.mesh, encoder, timer);
         }
         // Irradiance in texture space, blurred; only the gooey surface reads it.
         if let Some(light_map) = &self.light_map {
@@ -502,6 +524,7 @@ mod tests {
                 [
                     "tangents",
                     "depth-maps",
+                    "exit",
                     "geometry",
                     "subsurface",
                     "tonemap"

@@ -3,9 +3,13 @@
 use crate::geom::paint::TissueMaps;
 use crate::gpu::Gpu;
 use crate::optics::tone::linear_from_srgb;
-use image::RgbaImage;
+use half::f16;
+use image::{DynamicImage, RgbaImage};
 
-/// Views of the four maps, and how they are sampled.
+/// Textures of four layers each that the shaders have room for.
+pub const LAYER_MAPS_MAX: usize = 2;
+
+/// Views of the maps, and how they are sampled.
 pub struct Maps {
     /// Square roots of the linear colour of the outer layer, opacity in alpha.
     pub outer: wgpu::TextureView,
@@ -13,8 +17,9 @@ pub struct Maps {
     pub normal: wgpu::TextureView,
     /// Square roots of the linear colour of the deep tissue.
     pub inner: wgpu::TextureView,
-    /// Lower boundaries of the four layers, as shares of the deepest.
-    pub layers: wgpu::TextureView,
+    /// Lower boundaries of layers 1 to 4, as shares of the deepest, and of layers 5 to 8; of two views the second is
+    /// the first where there are no more than four.
+    pub layers: [wgpu::TextureView; LAYER_MAPS_MAX],
     /// Linear, with mipmaps.
     pub sampler: wgpu::Sampler,
 }
@@ -26,7 +31,10 @@ impl Maps {
             outer: upload(gpu, "outer map", square_roots(&maps.outer)),
             normal: upload(gpu, "normal map", maps.normal.clone()),
             inner: upload(gpu, "inner map", square_roots(&maps.inner)),
-            layers: upload(gpu, "layer map", maps.layers.clone()),
+            layers: std::array::from_fn(|k| {
+                let last = maps.layers.len() - 1;
+                upload_depths(gpu, &maps.layers[k.min(last)])
+            }),
             sampler: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("maps"),
                 mag_filter: wgpu::FilterMode::Linear,
@@ -57,45 +65,100 @@ fn square_roots(image: &RgbaImage) -> RgbaImage {
     image
 }
 
-fn upload(gpu: &Gpu, label: &str, image: RgbaImage) -> wgpu::TextureView {
-    // Four levels: further ones would mix charts of the atlas.
-    let levels = 4.min(1 + image.width().min(image.height()).ilog2());
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+/// Depths of layers as exactly as they come: bytes, or half floats of what has more bits. They are read at their
+/// finest level alone.
+fn upload_depths(gpu: &Gpu, image: &DynamicImage) -> wgpu::TextureView {
+    match image {
+        DynamicImage::ImageRgba16(_)
+        | DynamicImage::ImageRgb16(_)
+        | DynamicImage::ImageRgba32F(_)
+        | DynamicImage::ImageRgb32F(_) => {
+            let fine = image.to_rgba32f();
+            let halves: Vec<f16> = fine.iter().map(|&v| f16::from_f32(v)).collect();
+            let texture = texture(
+                gpu,
+                "layer map",
+                fine.dimensions().into(),
+                1,
+                wgpu::TextureFormat::Rgba16Float,
+            );
+            write_level(
+                gpu,
+                &texture,
+                0,
+                fine.width(),
+                bytemuck::cast_slice(&halves),
+            );
+            texture.create_view(&wgpu::TextureViewDescriptor::default())
+        }
+        _ => upload(gpu, "layer map", image.to_rgba8()),
+    }
+}
+
+fn texture(
+    gpu: &Gpu,
+    label: &str,
+    [width, height]: [u32; 2],
+    levels: u32,
+    format: wgpu::TextureFormat,
+) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some(label),
         size: wgpu::Extent3d {
-            width: image.width(),
-            height: image.height(),
+            width,
+            height,
             depth_or_array_layers: 1,
         },
         mip_level_count: levels,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Rgba8Unorm,
+        format,
         usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
-    });
+    })
+}
+
+/// Fills a level that is `width` wide [px].
+fn write_level(gpu: &Gpu, texture: &wgpu::Texture, level: u32, width: u32, bytes: &[u8]) {
+    let texel = texture
+        .format()
+        .block_copy_size(None)
+        .expect("a colour format has a size");
+    gpu.queue.write_texture(
+        wgpu::TexelCopyTextureInfo {
+            mip_level: level,
+            ..texture.as_image_copy()
+        },
+        bytes,
+        wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(texel * width),
+            rows_per_image: None,
+        },
+        wgpu::Extent3d {
+            width,
+            height: bytes.len() as u32 / (texel * width),
+            depth_or_array_layers: 1,
+        },
+    );
+}
+
+fn upload(gpu: &Gpu, label: &str, image: RgbaImage) -> wgpu::TextureView {
+    // Four levels: further ones would mix charts of the atlas.
+    let levels = 4.min(1 + image.width().min(image.height()).ilog2());
+    let texture = texture(
+        gpu,
+        label,
+        image.dimensions().into(),
+        levels,
+        wgpu::TextureFormat::Rgba8Unorm,
+    );
     let mut level_image = image;
     for level in 0..levels {
         if level > 0 {
             level_image = halved(&level_image);
         }
-        gpu.queue.write_texture(
-            wgpu::TexelCopyTextureInfo {
-                mip_level: level,
-                ..texture.as_image_copy()
-            },
-            &level_image,
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(4 * level_image.width()),
-                rows_per_image: None,
-            },
-            wgpu::Extent3d {
-                width: level_image.width(),
-                height: level_image.height(),
-                depth_or_array_layers: 1,
-            },
-        );
+        write_level(gpu, &texture, level, level_image.width(), &level_image);
     }
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }

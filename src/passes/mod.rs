@@ -3,6 +3,7 @@
 pub mod backdrop;
 pub mod depth_maps;
 pub mod draw;
+pub mod exit;
 pub mod frame;
 pub mod geometry;
 pub mod light_path;

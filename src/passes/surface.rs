@@ -25,6 +25,8 @@ pub struct SurfaceInputs<'a> {
     pub light_map: &'a wgpu::TextureView,
     /// Where light 0 enters the body; any depth texture will do without shadows.
     pub shadow_map: &'a wgpu::TextureView,
+    /// Where the view rays leave the body again, for [`CoverKind::DepthMaps`]; else any depth texture will do.
+    pub exit_map: &'a wgpu::TextureView,
     /// The maps of all lights, for [`CoverKind::DepthMaps`]; `shadow_map` is their depth.
     pub depth_maps: Option<&'a DepthMaps>,
 }
@@ -55,6 +57,7 @@ impl Surface {
                     "light.wgsl",
                     "pixel.wgsl",
                     "medium.wgsl",
+                    "layers_four.wgsl",
                     "light_plane.wgsl",
                     "subsurface.wgsl"
                 ],
@@ -65,6 +68,7 @@ impl Surface {
                     "light.wgsl",
                     "pixel.wgsl",
                     "medium.wgsl",
+                    "layers_four.wgsl",
                     "light_entry.wgsl",
                     "light_depth.wgsl",
                     "subsurface.wgsl"
@@ -76,6 +80,7 @@ impl Surface {
                     "light.wgsl",
                     "pixel.wgsl",
                     "medium.wgsl",
+                    "layers_four.wgsl",
                     "light_quadric.wgsl",
                     "subsurface.wgsl"
                 ],
@@ -106,8 +111,23 @@ impl Surface {
             gpu,
             section,
             inputs,
-            &join(Self::wgsl(section.kind, inputs.cover)),
+            &join(&Self::parts(section, inputs.cover)),
         )
+    }
+
+    /// The WGSL files of the model that `section` names: those of [`Surface::wgsl`], for as many layers.
+    pub fn parts(section: &SurfaceSection, cover: CoverKind) -> Vec<Wgsl> {
+        let mut parts = Self::wgsl(section.kind, cover).to_vec();
+        if section.layers.len() > LAYERS {
+            let eight = crate::wgsl!["layers_eight.wgsl"];
+            parts.retain(|part| !part.file.ends_with("/medium.wgsl"));
+            for part in &mut parts {
+                if part.file.ends_with("/layers_four.wgsl") {
+                    *part = eight[0];
+                }
+            }
+        }
+        parts
     }
 
     /// As [`Surface::new`] with other WGSL: lets a test sabotage the model and see the check fail.
@@ -131,14 +151,21 @@ impl Surface {
             constants.extend([
                 ("QUADRATURE", quadrature),
                 ("SAMPLES", f64::from(section.samples)),
-                ("PIECES", f64::from(section.samples.div_ceil(LAYERS as u32))),
+                (
+                    "PIECES",
+                    f64::from(section.samples.div_ceil(section.layers.len() as u32)),
+                ),
+                ("LAYER_COUNT", section.layers.len() as f64),
             ]);
+            if inputs.cover == CoverKind::Planes && section.quadrature == Quadrature::Published {
+                constants.push(("MIRRORED", 1.0));
+            }
         }
         let draw = Draw::new(
             gpu,
             &DrawKind {
                 pass: section.kind.name(),
-                parts: Self::wgsl(section.kind, inputs.cover),
+                parts: &Self::parts(section, inputs.cover),
                 source,
                 vertex: "pixel_vertex",
                 attributes: &[],
@@ -197,15 +224,20 @@ fn bindings<'a>(inputs: &SurfaceInputs<'a>) -> Vec<Binding<'a>> {
         Binding::Texture(&inputs.maps.outer),
         Binding::Texture(&inputs.maps.normal),
         Binding::Texture(&inputs.maps.inner),
-        Binding::Texture(&inputs.maps.layers),
+        Binding::Texture(&inputs.maps.layers[0]),
         Binding::Texture(inputs.light_map),
         Binding::Depth(inputs.shadow_map),
     ];
-    if let Some(maps) = inputs.depth_maps {
-        bindings.extend([
-            Binding::Uniform(&maps.views),
-            Binding::Integers(&maps.normals.view),
-        ]);
-    }
+    // What one cover reads is bound for all: the layers beyond the fourth follow it.
+    let none = (inputs.frame, &inputs.geometry.base.view, inputs.shadow_map);
+    let (views, normals, exits) = inputs.depth_maps.map_or(none, |maps| {
+        (&maps.views, &maps.normals.view, inputs.exit_map)
+    });
+    bindings.extend([
+        Binding::Uniform(views),
+        Binding::Integers(normals),
+        Binding::Depth(exits),
+        Binding::Texture(&inputs.maps.layers[1]),
+    ]);
     bindings
 }

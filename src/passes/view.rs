@@ -1,6 +1,6 @@
 //! What the shaders know of a frame: camera, lights, layers and knobs, as one uniform.
 
-use crate::optics::Layer;
+use crate::optics::LAYERS_MAX;
 use crate::scene::{LIGHTS_MAX, PlacedLight, RestBox, Scene, SurfaceSection};
 use glam::{Mat4, Vec3};
 
@@ -115,8 +115,8 @@ pub struct FrameUniform {
     pub shadow_from_world: [f32; 16],
     pub eye: [f32; 4],
     pub lights: [LightUniform; LIGHTS_MAX],
-    pub extinction: [[f32; 4]; 4],
-    pub albedo: [[f32; 4]; 4],
+    pub extinction: [[f32; 4]; LAYERS_MAX],
+    pub albedo: [[f32; 4]; LAYERS_MAX],
     pub through: [f32; 4],
     pub size: [f32; 4],
     pub layer_depth_max_m: f32,
@@ -191,7 +191,8 @@ impl FrameUniform {
                     .to_array(),
             },
         };
-        let layers = surface.layers.map(Layer::from);
+        let layers = surface.repeated_layers();
+        let deepest = layers[surface.layers.len().max(1) - 1];
         let clearest = layers
             .iter()
             .map(|layer| layer.extinction_per_m().min_element())
@@ -210,7 +211,7 @@ impl FrameUniform {
             extinction: layers
                 .map(|layer| layer.extinction_per_m().extend(layer.asymmetry).to_array()),
             albedo: layers.map(|layer| layer.albedo().extend(0.0).to_array()),
-            through: layers[3].diffuse_attenuation_per_m().extend(0.0).to_array(),
+            through: deepest.diffuse_attenuation_per_m().extend(0.0).to_array(),
             size: [width, height, 1.0 / width, 1.0 / height],
             layer_depth_max_m: surface.layer_depth_max_m,
             reach_m: OPTICAL_DEPTH_MAX / clearest,

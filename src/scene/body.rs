@@ -78,8 +78,23 @@ pub struct MapFiles {
     pub normal: PathBuf,
     /// sRGB colour of the deep tissue.
     pub inner: PathBuf,
-    /// Lower boundary of the four layers, as shares of the deepest.
-    pub layers: PathBuf,
+    /// Lower boundaries of four layers each, as shares of the deepest: one file, or a list.
+    #[serde(deserialize_with = "one_or_more")]
+    pub layers: Vec<PathBuf>,
+}
+
+/// A path, or a list of them.
+fn one_or_more<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Vec<PathBuf>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged, expecting = "a path, or a list of paths")]
+    enum Paths {
+        One(PathBuf),
+        More(Vec<PathBuf>),
+    }
+    Ok(match Paths::deserialize(from)? {
+        Paths::One(path) => vec![path],
+        Paths::More(paths) => paths,
+    })
 }
 
 /// Where a body is held; exactly one of the forms.
@@ -191,14 +206,10 @@ impl BodySection {
         };
         self.file.as_mut().map(resolve);
         if let Some(maps) = &mut self.maps {
-            for path in [
-                &mut maps.outer,
-                &mut maps.normal,
-                &mut maps.inner,
-                &mut maps.layers,
-            ] {
+            for path in [&mut maps.outer, &mut maps.normal, &mut maps.inner] {
                 resolve(path);
             }
+            maps.layers.iter_mut().for_each(resolve);
         }
     }
 

@@ -1,7 +1,7 @@
 //! `[surface]`: the one surface model of a scene, its layers and its knobs.
 
 use super::check::Checker;
-use crate::optics::{LAYERS, Layer};
+use crate::optics::{LAYERS_MAX, Layer};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -12,15 +12,15 @@ pub struct SurfaceSection {
     /// Which model.
     pub kind: SurfaceKind,
     /// `subsurface`: places along the view ray where light is gathered; by layer, rounded up to as many in
-    /// each of the four.
+    /// each layer.
     pub samples: u32,
     /// `subsurface`: how the light between them is summed.
     pub quadrature: Quadrature,
     /// `subsurface`: depth that the value 1 of the layer texture stands for [m].
     pub layer_depth_max_m: f32,
-    /// `subsurface`: the four layers, outermost first; the last goes on below its boundary.
+    /// `subsurface`: one to eight layers, outermost first; the last goes on below its boundary.
     #[serde(rename = "layer")]
-    pub layers: [LayerSection; LAYERS],
+    pub layers: Vec<LayerSection>,
     /// `subsurface`: how far the colour textures tint the layers (Norberg 2010, 5.1), 0 to 1.
     pub color_blend: f32,
     /// `subsurface`: strength of light that scattered more than once, as a wrapped diffuse term.
@@ -145,7 +145,7 @@ impl Default for SurfaceSection {
             layer_depth_max_m: 0.006,
             // Ratios between the colours as published for blood-rich tissue; all of it about six
             // times clearer, so that what lies below shows at the distance of a whole organ.
-            layers: [
+            layers: vec![
                 layer([15.0, 30.0, 35.0], [120.0, 130.0, 140.0], 0.3),
                 layer([60.0, 800.0, 1000.0], [250.0, 270.0, 290.0], 0.4),
                 layer([180.0, 1700.0, 1500.0], [140.0, 120.0, 160.0], 0.5),
@@ -181,7 +181,21 @@ impl SurfaceSection {
         self.layers.iter().map(clearest).fold(0.0, f32::max)
     }
 
+    /// The layers as shaders take them: the last one is repeated below.
+    pub fn repeated_layers(&self) -> [Layer; LAYERS_MAX] {
+        std::array::from_fn(|j| self.layers[j.min(self.layers.len() - 1)].into())
+    }
+
     pub(super) fn check(&self, c: &mut Checker) {
+        if !(1..=LAYERS_MAX).contains(&self.layers.len()) {
+            c.problem(
+                "surface.layer",
+                &format!(
+                    "there are {}; 1 to {LAYERS_MAX} are allowed",
+                    self.layers.len()
+                ),
+            );
+        }
         c.range("surface.samples", self.samples as f32, 1.0, 256.0);
         c.range(
             "surface.layer_depth_max_m",

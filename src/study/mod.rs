@@ -9,6 +9,7 @@ mod document;
 mod findings;
 mod held_body;
 mod journal;
+mod march;
 mod merge;
 mod minimal;
 mod oracle;
@@ -24,12 +25,14 @@ mod solver;
 mod stability;
 mod stretch;
 mod sweep;
+mod table2;
 mod timing;
 
 pub use shard::Shard;
 
 use crate::app::{AppError, Outcome};
 use crate::measure::page::Section;
+use march::March;
 use minimal::Minimal;
 use planes::Planes;
 use pokes::Pokes;
@@ -38,6 +41,7 @@ use solver::Solver;
 use stability::Stability;
 use std::path::{Path, PathBuf};
 use stretch::Stretch;
+use table2::Table2;
 
 /// Version and commit, as rows are marked with.
 const VERSION: (&str, &str) = (env!("CARGO_PKG_VERSION"), env!("PALPATE_COMMIT"));
@@ -48,6 +52,10 @@ const VERSION: (&str, &str) = (env!("CARGO_PKG_VERSION"), env!("PALPATE_COMMIT")
 pub enum Study {
     /// Light below a moving surface: what each method costs, and how wrong it is.
     Planes,
+    /// How far the march below the surface is off, by quadrature and samples.
+    March,
+    /// François' Table 2, on surfaces of our own.
+    Table2,
     /// How deep layers seem where the surface is stretched.
     Stretch,
     /// What each optional feature costs and changes.
@@ -62,8 +70,10 @@ pub enum Study {
 
 impl Study {
     /// Every study.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 8] = [
         Self::Planes,
+        Self::March,
+        Self::Table2,
         Self::Stretch,
         Self::Minimal,
         Self::Solver,
@@ -75,6 +85,8 @@ impl Study {
     pub fn name(self) -> &'static str {
         match self {
             Self::Planes => "planes",
+            Self::March => "march",
+            Self::Table2 => "table2",
             Self::Stretch => "stretch",
             Self::Minimal => "minimal",
             Self::Solver => "solver",
@@ -92,6 +104,8 @@ impl Study {
     fn title(self) -> &'static str {
         match self {
             Self::Planes => "Light below a moving surface: time a frame against error",
+            Self::March => "The march below the surface: time against error",
+            Self::Table2 => "The published table of frame rates",
             Self::Stretch => "Layers under stretch",
             Self::Minimal => "What each feature costs and changes",
             Self::Solver => "The solver: time a frame against error",
@@ -103,6 +117,8 @@ impl Study {
     fn run(self, options: &StudyOptions) -> Result<Outcome, AppError> {
         match self {
             Self::Planes => run::run::<Planes>(options),
+            Self::March => run::run::<March>(options),
+            Self::Table2 => run::run::<Table2>(options),
             Self::Stretch => run::run::<Stretch>(options),
             Self::Minimal => run::run::<Minimal>(options),
             Self::Solver => run::run::<Solver>(options),
@@ -114,6 +130,8 @@ impl Study {
     fn merge(self, out: &Path, parts: &[PathBuf]) -> Result<Outcome, AppError> {
         match self {
             Self::Planes => merge::merge::<Planes>(out, parts),
+            Self::March => merge::merge::<March>(out, parts),
+            Self::Table2 => merge::merge::<Table2>(out, parts),
             Self::Stretch => merge::merge::<Stretch>(out, parts),
             Self::Minimal => merge::merge::<Minimal>(out, parts),
             Self::Solver => merge::merge::<Solver>(out, parts),
@@ -125,6 +143,8 @@ impl Study {
     fn section(self, out: &Path) -> Result<Section, AppError> {
         match self {
             Self::Planes => output::section::<Planes>(out),
+            Self::March => output::section::<March>(out),
+            Self::Table2 => output::section::<Table2>(out),
             Self::Stretch => output::section::<Stretch>(out),
             Self::Minimal => output::section::<Minimal>(out),
             Self::Solver => output::section::<Solver>(out),

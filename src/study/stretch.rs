@@ -201,7 +201,7 @@ impl Stretch {
             outer: blank(),
             normal: blank(),
             inner: blank(),
-            layers: blank(),
+            layers: vec![blank().into()],
         };
         let rest = RestBox { low, high };
         let size = [PICTURE_PX; 2];

@@ -44,7 +44,10 @@ fn png_files(maps: &TissueMaps) -> [(&'static str, Vec<u8>); 4] {
         ("outer", png_bytes(&maps.outer, Channels::All)),
         ("normal", png_bytes(&maps.normal, Channels::Colour)),
         ("inner", png_bytes(&maps.inner, Channels::Colour)),
-        ("layers", png_bytes(&maps.layers, Channels::All)),
+        (
+            "layers",
+            png_bytes(&maps.layers[0].to_rgba8(), Channels::All),
+        ),
     ]
 }
 

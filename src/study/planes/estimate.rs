@@ -47,19 +47,19 @@ pub struct DepthMap {
 
 impl DepthMap {
     /// The way [m] from `at` to the light; `None` where none comes. As `way_under` of `shaders/light_depth.wgsl`, with
-    /// `flat_m` where the map is empty.
+    /// `flat_m` where the map is empty, and nothing where that faces away.
     fn way_m(&self, at: Vec3, to_light: Vec3, flat_m: Option<f32>) -> Option<f32> {
         let clip = self.clip_from_world * at.extend(1.0);
         let ndc = clip.truncate().truncate() / clip.w;
         let size = self.side as f32;
         let texel = ((ndc * Vec2::new(0.5, -0.5) + 0.5) * size).floor();
         if texel.min_element() < 0.0 || texel.max_element() >= size {
-            return flat_m;
+            return flat_m.or(Some(0.0));
         }
         let index = texel.y as usize * self.side as usize + texel.x as usize;
         let depth = self.depth[index];
         if depth >= 1.0 {
-            return flat_m;
+            return flat_m.or(Some(0.0));
         }
         let centre = (texel + 0.5) / size * Vec2::new(2.0, -2.0) + Vec2::new(-1.0, 1.0);
         let entry = self.world_from_clip.project_point3(centre.extend(depth));

@@ -1,0 +1,229 @@
+//! Scores of a rendered scene, and the goals of its folder.
+
+use super::super::AppError;
+use super::scene::ReferenceScene;
+use crate::measure::npz;
+use crate::measure::radiance::{self, Picture, Reference, Scores};
+use serde::Deserialize;
+use serde_json::json;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Heads of the table.
+pub const HEAD: [&str; 11] = [
+    "scene",
+    "relRMSE",
+    "bias",
+    "FLIP",
+    "after gain",
+    "vein",
+    "cover px",
+    "not finite",
+    "surface ms",
+    "frame ms",
+    "goal",
+];
+
+/// What a scene's scores must not exceed.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
+pub struct Goal {
+    #[serde(rename = "relRMSE")]
+    pub rel_rmse: f64,
+    #[serde(rename = "FLIP", default)]
+    pub flip: Option<f64>,
+    #[serde(default)]
+    pub vein: Option<f64>,
+}
+
+/// The goals of a folder, by scene.
+#[derive(Debug, Default)]
+pub struct Goals(HashMap<String, Goal>);
+
+impl Goals {
+    /// The goals in `dir/goals.json` under `single`; none if there is no such file.
+    pub fn of_folder(dir: &Path) -> Result<Self, AppError> {
+        #[derive(Deserialize)]
+        struct File {
+            #[serde(default)]
+            single: HashMap<String, Goal>,
+        }
+        let path = dir.join("goals.json");
+        let bytes = match std::fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return Ok(Self::default());
+            }
+            Err(source) => {
+                return Err(AppError::Read {
+                    path: path.display().to_string(),
+                    source,
+                });
+            }
+        };
+        let file: File = serde_json::from_slice(&bytes)
+            .map_err(|error| AppError::Usage(format!("{}: {error}", path.display())))?;
+        Ok(Self(file.single))
+    }
+
+    /// The goal of the scene called `name`.
+    pub fn of(&self, name: &str) -> Option<Goal> {
+        self.0.get(name).copied()
+    }
+}
+
+/// The reference picture of `scene`; `None` if there is none.
+///
+/// # Errors
+///
+/// [`AppError::Usage`] naming the file and what is wrong with it.
+pub fn reference(scene: &ReferenceScene) -> Result<Option<Reference>, AppError> {
+    let path = &scene.reference;
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(source) => {
+            return Err(AppError::Read {
+                path: path.display().to_string(),
+                source,
+            });
+        }
+    };
+    let wrong = |problem: String| AppError::Usage(format!("{}: {problem}", path.display()));
+    let names = npz::names(&bytes).map_err(wrong)?;
+    let [width, height] = scene.size.map(u64::from);
+    let picture = |name: &str, shape: &[u64]| {
+        let array = npz::read(&bytes, name).map_err(wrong)?;
+        if array.shape == shape {
+            Ok(array.values)
+        } else {
+            Err(wrong(format!(
+                "array `{name}` is of shape {:?}, the scene's camera makes {shape:?}",
+                array.shape
+            )))
+        }
+    };
+    let rgb_shape = [height, width, 3];
+    let without_veins = if names.iter().any(|name| name == "single_noveins") {
+        Some(picture("single_noveins", &rgb_shape)?)
+    } else {
+        None
+    };
+    Ok(Some(Reference {
+        size: [width as usize, height as usize],
+        rgb: picture("single", &rgb_shape)?,
+        mask: picture("mask", &[height, width])?
+            .iter()
+            .map(|v| *v > 0.5)
+            .collect(),
+        without_veins,
+    }))
+}
+
+/// How far the picture `rgb` of `scene` is from its reference; `None` if there is none.
+///
+/// # Errors
+///
+/// As [`reference`].
+pub fn scores(scene: &ReferenceScene, rgb: &[f32]) -> Result<Option<Scores>, AppError> {
+    let size = scene.size.map(|side| side as usize);
+    Ok(reference(scene)?.map(|reference| radiance::scores(Picture { size, rgb }, &reference)))
+}
+
+/// A scene that was rendered.
+#[derive(Debug)]
+pub struct Scored {
+    pub name: String,
+    /// `None` without a reference.
+    pub scores: Option<Scores>,
+    pub goal: Option<Goal>,
+    /// GPU time of the surface, and of the whole frame [ms].
+    pub surface_ms: Option<f64>,
+    pub frame_ms: Option<f64>,
+}
+
+impl Scored {
+    /// Whether there is a goal that was not reached.
+    pub fn missed(&self) -> bool {
+        let Some(goal) = self.goal else {
+            return false;
+        };
+        self.scores.is_none_or(|scores| {
+            let over = |value: Option<f64>, goal: Option<f64>| match (value, goal) {
+                (Some(value), Some(goal)) => value.is_nan() || value > goal,
+                (None, Some(_)) => true,
+                (_, None) => false,
+            };
+            scores.nonfinite_px > 0
+                || over(Some(scores.rel_rmse), Some(goal.rel_rmse))
+                || over(Some(scores.flip), goal.flip)
+                || over(scores.vein, goal.vein)
+        })
+    }
+
+    fn verdict(&self) -> &'static str {
+        match (&self.goal, &self.scores) {
+            (None, None) => "no reference",
+            (None, Some(_)) => "no goal",
+            (Some(_), None) => "MISSED: no reference",
+            (Some(_), Some(_)) if self.missed() => "MISSED",
+            (Some(_), Some(_)) => "met",
+        }
+    }
+
+    /// A line of the table.
+    pub fn cells(&self) -> Vec<String> {
+        let told = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.4}"));
+        let of = |f: &dyn Fn(&Scores) -> f64| told(self.scores.as_ref().map(f));
+        let goal = self.goal.map_or(String::new(), |goal| {
+            let limit = |value: Option<f64>| value.map_or("-".to_owned(), |v| v.to_string());
+            format!(
+                " (<= {}, FLIP {}, vein {})",
+                goal.rel_rmse,
+                limit(goal.flip),
+                limit(goal.vein)
+            )
+        });
+        vec![
+            self.name.clone(),
+            of(&|s| s.rel_rmse),
+            self.scores
+                .map_or("-".to_owned(), |s| format!("{:+.4}", s.bias)),
+            of(&|s| s.flip),
+            of(&|s| s.rel_rmse_after_gain),
+            told(self.scores.and_then(|s| s.vein)),
+            self.scores
+                .map_or("-".to_owned(), |s| s.coverage_mismatch_px.to_string()),
+            self.scores
+                .map_or("-".to_owned(), |s| s.nonfinite_px.to_string()),
+            told(self.surface_ms),
+            told(self.frame_ms),
+            format!("{}{goal}", self.verdict()),
+        ]
+    }
+
+    /// The same, for programs.
+    pub fn json(&self) -> serde_json::Value {
+        let finite = |value: f64| value.is_finite().then_some(value);
+        let scores = self.scores.map(|s| {
+            json!({
+                "relRMSE": finite(s.rel_rmse),
+                "bias": finite(s.bias),
+                "FLIP": finite(s.flip),
+                "relRMSE_after_gain": finite(s.rel_rmse_after_gain),
+                "vein": s.vein.and_then(finite),
+                "coverage_mismatch_px": s.coverage_mismatch_px,
+                "nonfinite_px": s.nonfinite_px,
+            })
+        });
+        json!({
+            "name": self.name,
+            "scores": scores,
+            "goal": self.goal.map(|goal| json!({
+                "relRMSE": goal.rel_rmse, "FLIP": goal.flip, "vein": goal.vein,
+            })),
+            "verdict": self.verdict(),
+            "surface_ms_p50": self.surface_ms,
+            "frame_ms_p50": self.frame_ms,
+        })
+    }
+}
