@@ -3,11 +3,12 @@
 use super::depth_maps::DepthMaps;
 use super::draw::{DepthUse, Draw, DrawKind, Target, cleared, read_depth};
 use super::geometry::GeometryTargets;
+use super::green::Green;
 use super::light_path::CoverKind;
 use super::maps::Maps;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join};
 use crate::optics::LAYERS;
-use crate::scene::{Quadrature, SurfaceKind, SurfaceSection};
+use crate::scene::{DiffusionCore, Quadrature, SurfaceKind, SurfaceSection};
 
 /// What a surface reads, made by other passes.
 pub struct SurfaceInputs<'a> {
@@ -27,6 +28,8 @@ pub struct SurfaceInputs<'a> {
     pub shadow_map: &'a wgpu::TextureView,
     /// The maps of all lights, for [`CoverKind::DepthMaps`]; `shadow_map` is their depth.
     pub depth_maps: Option<&'a DepthMaps>,
+    /// What the surfaces after Green (2004) read more.
+    pub green: Option<&'a Green>,
 }
 
 /// The draw of the tissue.
@@ -89,6 +92,38 @@ impl Surface {
                 "layers.wgsl",
                 "gooey.wgsl"
             ],
+            SurfaceKind::Wrap => crate::wgsl![
+                "frame.wgsl",
+                "pack.wgsl",
+                "film.wgsl",
+                "light.wgsl",
+                "pixel.wgsl",
+                "green_pixel.wgsl",
+                "wrap_lookup.wgsl",
+                "wrap.wgsl"
+            ],
+            SurfaceKind::Absorption => crate::wgsl![
+                "frame.wgsl",
+                "pack.wgsl",
+                "film.wgsl",
+                "light.wgsl",
+                "pixel.wgsl",
+                "green_pixel.wgsl",
+                "green.wgsl",
+                "wrap_lookup.wgsl",
+                "body_light.wgsl",
+                "absorption.wgsl"
+            ],
+            SurfaceKind::Diffusion => crate::wgsl![
+                "frame.wgsl",
+                "pack.wgsl",
+                "film.wgsl",
+                "light.wgsl",
+                "pixel.wgsl",
+                "green_pixel.wgsl",
+                "green.wgsl",
+                "diffusion.wgsl"
+            ],
         }
     }
 
@@ -133,6 +168,13 @@ impl Surface {
                 ("SAMPLES", f64::from(section.samples)),
                 ("PIECES", f64::from(section.samples.div_ceil(LAYERS as u32))),
             ]);
+        }
+        if section.kind == SurfaceKind::Absorption {
+            constants.extend(Green::constants(section));
+        }
+        if section.kind == SurfaceKind::Diffusion {
+            let at_pixel = section.diffusion.core == DiffusionCore::Pixel;
+            constants.push(("PIXEL_CORE", f64::from(u8::from(at_pixel))));
         }
         let draw = Draw::new(
             gpu,
@@ -186,7 +228,7 @@ impl Surface {
     }
 }
 
-/// The bindings of `shaders/pixel.wgsl`, in its order, and of `shaders/light_depth.wgsl`.
+/// The bindings of `shaders/pixel.wgsl`, in its order, and of `shaders/light_depth.wgsl` or `shaders/green.wgsl`.
 fn bindings<'a>(inputs: &SurfaceInputs<'a>) -> Vec<Binding<'a>> {
     let mut bindings = vec![
         Binding::Uniform(inputs.frame),
@@ -206,6 +248,9 @@ fn bindings<'a>(inputs: &SurfaceInputs<'a>) -> Vec<Binding<'a>> {
             Binding::Uniform(&maps.views),
             Binding::Integers(&maps.normals.view),
         ]);
+    }
+    if let Some(green) = inputs.green {
+        bindings.extend(green.bindings());
     }
     bindings
 }
