@@ -4,7 +4,8 @@
 //
 // Taps come in pairs about the middle, so nothing moves. A pair with a tap in another chart or in none counts as the
 // middle: across a seam nothing leaks, and an even slope of light stays what it is, so that both sides of a seam agree.
-// Texels of the gutter take what lies nearest to them; each pass widens the charts by one texel.
+// Where the taps would be too many they are spread, over what the blur before has smoothed. Texels of the gutter take
+// what lies nearest to them; each pass widens the charts by one texel.
 //
 // Source:  Green 2004, 16.4, listings 16-6 and 16-7 (separable, weights per colour); d'Eon and Luebke, "Advanced
 //          Techniques for Realistic Real-Time Skin Rendering", GPU Gems 3, ch. 14, 2007 (sums of Gaussians, each made
@@ -16,7 +17,7 @@
 // Fails:   widths of an eighth of the map and more are cut; charts narrower than a width are blurred less.
 
 struct Diffuse {
-    // Widths of this blur [m], per colour.
+    // Widths of this blur [m], per colour; w: taps on each side, at most.
     sigma_m: vec4f,
     // What the last blur gives of itself and of the two before.
     own: vec4f,
@@ -35,9 +36,6 @@ struct Diffuse {
 override AXIS: u32 = 0u;
 // 1: the sum of the Gaussians is written, and coverage in alpha.
 override LAST: u32 = 0u;
-
-// Taps on each side, at most.
-const TAPS: f32 = 9.0;
 
 @vertex
 fn diffuse_vertex(@builtin(vertex_index) corner: u32) -> @builtin(position) vec4f {
@@ -87,7 +85,7 @@ fn diffused(at: vec2i) -> vec4f {
     let longest = max(max(abs(step.x), abs(step.y)), 1e-9);
     let sigma = min(blur.sigma_m.xyz * longest, vec3f(0.125 * size));
     let reach = 3.0 * max(max(sigma.x, sigma.y), sigma.z);
-    let stride = max(ceil(reach / TAPS), 1.0);
+    let stride = max(ceil(reach / blur.sigma_m.w), 1.0);
     let narrow = -0.5 / max(sigma * sigma, vec3f(1e-4));
     var sum = here.rgb;
     var weight = vec3f(1.0);

@@ -1,7 +1,7 @@
-// Tissue in which light wanders: the light map, blurred by as much, and the narrowest Gaussian lit at the pixel; a wet
-// film.
+// Tissue in which light wanders: the light map, blurred by as much; what wanders less than its texels can tell is lit
+// at the pixel; a wet film.
 //
-//   L = color / pi (w_1 E + (1 - w_1) blurred E) + wet film
+//   L = color / pi (w E + (1 - w) blurred E) + wet film,   w = sum over the Gaussians of w_i 2^-(sigma_i / 0.4 texels)^2
 //
 // Of the colour, a power lies in the light map already where the scene asks so.
 //
@@ -12,9 +12,6 @@
 // Units:   W/(m2 sr).
 // Fails:   parts of the texture map thinner than a texel have no blurred light, and are lit at the pixel alone.
 
-// 1: the narrowest Gaussian is lit at the pixel.
-override PIXEL_CORE: u32 = 1u;
-
 @fragment
 fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let pixel = pixel_at(at);
@@ -24,9 +21,6 @@ fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let has_map = blurred.a > 0.02;
     let soft = blurred.rgb / max(blurred.a, 0.02) * pow(max(color, vec3f(1e-4)), vec3f(1.0 - green.color_in_map));
     let core = select(vec3f(1.0), green.core.xyz, has_map);
-    if PIXEL_CORE == 0u && has_map {
-        return vec4f(soft / PI + wet(pixel, unshadowed), 1.0);
-    }
     var light = ambient(pixel.relief);
     if LIGHT_COUNT > 0u {
         light += unshadowed * lambert(0u, pixel);

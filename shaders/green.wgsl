@@ -12,7 +12,7 @@ struct Green {
     disc: array<vec4f, 16>,
     // Attenuation of light that comes through [1/m].
     attenuation: vec4f,
-    // Share of the narrowest Gaussian, per colour.
+    // Share of the light that does not wander farther than the light map can tell, per colour.
     core: vec4f,
     disc_radius_m: f32,
     glow: f32,

@@ -17,8 +17,12 @@ const SIGMA_SHARES: [f32; GAUSSIANS] = [0.107, 0.563, 1.64];
 /// Share of the light in each; they add up to one.
 const WEIGHTS: [f32; GAUSSIANS] = [0.23, 0.46, 0.31];
 
-/// Taps on each side of a texel, at most.
-const TAPS: f32 = 9.0;
+/// Taps on each side of a texel, at most, for each Gaussian: those of the last are spread over what the one before
+/// has smoothed.
+pub const TAPS: [u32; GAUSSIANS] = [16, 16, 9];
+
+/// Width at which half of a Gaussian is told from a spot in a map [texels].
+const SPOT_TEXELS: f32 = 0.4;
 
 /// The light that comes out of a tissue about the place where it went in.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +53,13 @@ impl Profile {
             before = sigma;
             step
         })
+    }
+
+    /// Share of each Gaussian that a map of `texels_per_m` can't tell from a spot, so that it is better lit at the
+    /// pixel: 2^−(σ/0.4 texels)².
+    pub fn spots(&self, texels_per_m: f32) -> [Vec3; GAUSSIANS] {
+        self.sigmas_m
+            .map(|sigma| (sigma * texels_per_m / SPOT_TEXELS).map(|t| (-t * t).exp2()))
     }
 
     /// Light at `x` [m] where half of the surface, x > 0, is lit by 1; in one colour.
@@ -107,13 +118,14 @@ pub enum Axis {
 }
 
 /// One blur of a square map of `width` texels, light in red, green, blue and the number of the chart in alpha, by
-/// widths of `sigma_m` [m] on the surface.
+/// widths of `sigma_m` [m] on the surface, with at most `taps` on each side.
 pub fn diffused(
     map: &[Vec4],
     metrics: &[Vec3],
     width: usize,
     axis: Axis,
     sigma_m: Vec3,
+    taps: u32,
 ) -> Vec<Vec4> {
     let side = width as i32;
     let texel = |at: IVec2| {
@@ -141,7 +153,7 @@ pub fn diffused(
             let longest = step.abs().max_element().max(1e-9);
             let sigma = (sigma_m * longest).min(Vec3::splat(0.125 * size));
             let reach = 3.0 * sigma.max_element();
-            let stride = (reach / TAPS).ceil().max(1.0);
+            let stride = (reach / taps as f32).ceil().max(1.0);
             let narrow = -0.5 / (sigma * sigma).max(Vec3::splat(1e-4));
             let mut sum = here.truncate();
             let mut weight = Vec3::ONE;

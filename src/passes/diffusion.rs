@@ -3,6 +3,7 @@
 
 use super::draw::{DepthUse, Draw, DrawKind, Target, cleared};
 use super::green::Green;
+use super::lightmap::uv_per_m;
 use super::maps::Maps;
 use super::mesh_buffers::MeshBuffers;
 use super::tangents::Tangents;
@@ -10,7 +11,7 @@ use crate::geom::SurfaceMesh;
 use crate::geom::chart::charts;
 use crate::geom::tangent::rest_gradients;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, storage, uniform};
-use crate::optics::diffusion::{GAUSSIANS, Profile, metric};
+use crate::optics::diffusion::{GAUSSIANS, Profile, TAPS, metric};
 use crate::scene::{DiffusionCore, SurfaceSection, UvMetric};
 use glam::Vec3;
 
@@ -56,6 +57,7 @@ pub struct Diffusion {
     light: Target,
     metric: Target,
     blurs: Vec<Blur>,
+    texels_per_m: f32,
 }
 
 /// The blur of one Gaussian along one direction.
@@ -148,6 +150,7 @@ impl Diffusion {
             light,
             metric,
             blurs,
+            texels_per_m: texels_per_m(section, surface_mesh),
         })
     }
 
@@ -190,7 +193,7 @@ impl Diffusion {
             self.draw.set(&mut pass);
             mesh.draw(&mut pass);
         }
-        let uniforms = uniforms(section);
+        let uniforms = uniforms(section, self.texels_per_m);
         for blur in &self.blurs {
             let knobs = uniforms[blur.gaussian];
             gpu.queue
@@ -207,30 +210,48 @@ impl Diffusion {
     }
 }
 
-/// Widths and shares of the blurs of each Gaussian.
-pub fn uniforms(section: &SurfaceSection) -> [DiffuseUniform; GAUSSIANS] {
+/// Mean texels of the light map on a metre of the surface at rest.
+pub fn texels_per_m(section: &SurfaceSection, mesh: &SurfaceMesh) -> f32 {
+    section.light_map_size_px as f32 * uv_per_m(mesh)
+}
+
+/// The profile of the layer that light wanders in, as wide as the scene asks.
+fn profile(section: &SurfaceSection) -> Profile {
     let layer = section.layers[section.diffusion.layer as usize - 1];
-    let profile = Profile::of(&layer.into());
+    let mut profile = Profile::of(&layer.into());
+    for sigma in &mut profile.sigmas_m {
+        *sigma *= section.diffusion.radius_scale;
+    }
+    profile
+}
+
+/// Share of all light that is lit at the pixel, and what each Gaussian has left for a light map of `texels_per_m`.
+pub fn shares(section: &SurfaceSection, texels_per_m: f32) -> (Vec3, [Vec3; GAUSSIANS]) {
+    let profile = profile(section);
+    let mut spots = profile.spots(texels_per_m);
+    if section.diffusion.core == DiffusionCore::Pixel {
+        spots[0] = Vec3::ONE;
+    }
+    let blurred = std::array::from_fn(|i| profile.weights[i] * (Vec3::ONE - spots[i]));
+    (Vec3::ONE - blurred.iter().sum::<Vec3>(), blurred)
+}
+
+/// Widths and shares of the blurs of each Gaussian.
+pub fn uniforms(section: &SurfaceSection, texels_per_m: f32) -> [DiffuseUniform; GAUSSIANS] {
+    let profile = profile(section);
     let first = Diffusion::blurred_gaussians(section).start;
     let mut steps = profile.steps_m();
     if first == 1 {
         // What is not made from the narrowest has its whole width to go.
         steps[1] = profile.sigmas_m[1];
     }
-    let blurred: Vec3 = profile.weights[first..].iter().sum();
-    let share = |gaussian: usize| {
-        let weight = if gaussian < first {
-            Vec3::ZERO
-        } else {
-            profile.weights[gaussian] / blurred
-        };
-        weight.extend(0.0).to_array()
-    };
-    steps.map(|step| DiffuseUniform {
-        sigma_m: (section.diffusion.radius_scale * step)
-            .extend(0.0)
-            .to_array(),
-        own: share(2),
+    let (_, blurred) = shares(section, texels_per_m);
+    // Where hardly anything is left for the map its sum hardly counts: the widest stands for it.
+    let sum = blurred.iter().sum::<Vec3>() + 1e-6;
+    let share = |gaussian: usize| (blurred[gaussian] / sum).extend(0.0).to_array();
+    std::array::from_fn(|gaussian| DiffuseUniform {
+        sigma_m: steps[gaussian].extend(TAPS[gaussian] as f32).to_array(),
+        own: ((blurred[2] + 1e-6) / sum).extend(0.0).to_array(),
         second: share(1),
         first: share(0),
     })

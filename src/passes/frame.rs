@@ -594,7 +594,13 @@ mod tests {
         let absorbing = green("\"absorption\"");
         assert_eq!(
             names(&absorbing),
-            ["tangents", "body-depths", "geometry", "absorption", "tonemap"],
+            [
+                "tangents",
+                "body-depths",
+                "geometry",
+                "absorption",
+                "tonemap"
+            ],
             "its first entries are the shadow map"
         );
         assert_eq!(absorbing.count_of("body-depths"), 3);
@@ -613,10 +619,9 @@ mod tests {
                 "tonemap"
             ]
         );
-        assert_eq!(diffusing.count_of("diffuse"), 4);
-        let both =
-            green("\"diffusion\"\ndiffusion = { core = \"map\", translucency = 1.0 }");
-        assert_eq!(both.count_of("diffuse"), 6);
+        assert_eq!(diffusing.count_of("diffuse"), 6);
+        let both = green("\"diffusion\"\ndiffusion = { core = \"pixel\", translucency = 1.0 }");
+        assert_eq!(both.count_of("diffuse"), 4);
         assert_eq!(both.count_of("body-depths"), 3);
         assert_eq!(both.count_of("shadow"), 0);
         assert_eq!(gooey.count_of("blur"), 3);

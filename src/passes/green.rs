@@ -2,6 +2,7 @@
 //! absorption, and the depth maps of the lights.
 
 use super::body_depths::BodyDepths;
+use super::diffusion::{shares, texels_per_m};
 use super::mesh_buffers::MeshBuffers;
 use super::shadow::SIZE_PX;
 use super::tangents::Tangents;
@@ -10,7 +11,6 @@ use crate::geom::SurfaceMesh;
 use crate::geom::paint::TissueMaps;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, uniform};
 use crate::optics::absorption::{RAMP_LENGTH, disc, layered_ramp};
-use crate::optics::diffusion::Profile;
 use crate::optics::wrap_lookup::{LOOKUP_SIDE, WrapLight};
 use crate::optics::{LAYERS, Layer};
 use crate::scene::{Falloff, LIGHTS_MAX, PlacedLight, SurfaceSection};
@@ -46,6 +46,8 @@ pub struct Green {
     /// Mean lower boundaries of the first three layers, as shares of the deepest.
     mean_bottoms: Vec3,
     depths: Option<BodyDepths>,
+    /// Of the light map.
+    texels_per_m: f32,
 }
 
 /// What is left of light at a place, as the surface's wrapped light is told.
@@ -80,12 +82,13 @@ impl Green {
             None
         };
         let green = Self {
-            uniform: uniform(gpu, "green", &green_uniform(section, &[], &[])),
+            uniform: uniform(gpu, "green", &green_uniform(section, &[], &[], 0.0)),
             lookup: Colors::new(gpu, "wrapped light", [LOOKUP_SIDE; 2]),
             ramp: Colors::new(gpu, "ramp", [RAMP_LENGTH, 1]),
             told_ramp: None,
             mean_bottoms: mean_color(&tissue.layers),
             depths,
+            texels_per_m: texels_per_m(section, mesh),
         };
         green.set_knobs(gpu, section);
         Ok(green)
@@ -167,7 +170,7 @@ impl Green {
                 .collect(),
             None => Vec::new(),
         };
-        let knobs = green_uniform(section, lights, &views);
+        let knobs = green_uniform(section, lights, &views, self.texels_per_m);
         gpu.queue
             .write_buffer(&self.uniform, 0, bytemuck::bytes_of(&knobs));
         if let Some(depths) = &self.depths {
@@ -176,18 +179,19 @@ impl Green {
     }
 }
 
-/// Knobs of `section`, and how each light's map lies.
+/// Knobs of `section` for a light map of `texels_per_m`, and how each light's map lies.
 pub fn green_uniform(
     section: &SurfaceSection,
     lights: &[PlacedLight],
     clip_from_world: &[Mat4],
+    texels_per_m: f32,
 ) -> GreenUniform {
     let absorption = &section.absorption;
     let mut looks = disc(absorption.samples as usize);
     looks.resize(32, Vec2::ZERO);
     let deepest = Layer::from(section.layers[LAYERS - 1]);
     let attenuation = absorption.way_share * deepest.diffuse_attenuation_per_m();
-    let profile = Profile::of(&section.layers[section.diffusion.layer as usize - 1].into());
+    let (at_pixel, _) = shares(section, texels_per_m);
     let mut green = GreenUniform {
         clip_from_world: [Mat4::IDENTITY.to_cols_array(); LIGHTS_MAX],
         spans: [[1.0; 4]; LIGHTS_MAX],
@@ -196,7 +200,7 @@ pub fn green_uniform(
             [a.x, a.y, b.x, b.y]
         }),
         attenuation: attenuation.extend(0.0).to_array(),
-        core: profile.weights[0].extend(0.0).to_array(),
+        core: at_pixel.extend(0.0).to_array(),
         disc_radius_m: absorption.disc_radius_m,
         glow: absorption.glow,
         ramp_per_m: 1.0 / absorption.ramp_length_m,

@@ -8,7 +8,7 @@ use super::light_path::CoverKind;
 use super::maps::Maps;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join};
 use crate::optics::LAYERS;
-use crate::scene::{DiffusionCore, Quadrature, SurfaceKind, SurfaceSection};
+use crate::scene::{Quadrature, SurfaceKind, SurfaceSection};
 
 /// What a surface reads, made by other passes.
 pub struct SurfaceInputs<'a> {
@@ -171,10 +171,6 @@ impl Surface {
         }
         if section.kind == SurfaceKind::Absorption {
             constants.extend(Green::constants(section));
-        }
-        if section.kind == SurfaceKind::Diffusion {
-            let at_pixel = section.diffusion.core == DiffusionCore::Pixel;
-            constants.push(("PIXEL_CORE", f64::from(u8::from(at_pixel))));
         }
         let draw = Draw::new(
             gpu,

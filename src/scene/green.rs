@@ -125,10 +125,10 @@ impl AbsorptionSection {
 #[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
 pub enum DiffusionCore {
-    /// Lit at the pixel: on an organ it is narrower than a texel.
-    #[default]
+    /// Lit at the pixel: on an organ it is narrower than a texel, and two blurs are saved.
     Pixel,
-    /// Blurred in the light map like the others: for bodies of millimetres.
+    /// Blurred in the light map like the others, as far as its texels are fine enough.
+    #[default]
     Map,
 }
 
