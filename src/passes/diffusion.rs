@@ -217,7 +217,8 @@ pub fn texels_per_m(section: &SurfaceSection, mesh: &SurfaceMesh) -> f32 {
 
 /// The profile of the layer that light wanders in, as wide as the scene asks.
 fn profile(section: &SurfaceSection) -> Profile {
-    let layer = section.layers[section.diffusion.layer as usize - 1];
+    let last = section.layers.len() - 1;
+    let layer = section.layers[(section.diffusion.layer as usize - 1).min(last)];
     let mut profile = Profile::of(&layer.into());
     for sigma in &mut profile.sigmas_m {
         *sigma *= section.diffusion.radius_scale;

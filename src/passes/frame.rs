@@ -603,9 +603,9 @@ mod tests {
             ],
             "its first entries are the shadow map"
         );
-        assert_eq!(absorbing.count_of("body-depths"), 3);
-        let one = green("\"absorption\"\nabsorption = { depth_layers = 1 }");
-        assert_eq!(one.count_of("body-depths"), 1);
+        assert_eq!(absorbing.count_of("body-depths"), 1);
+        let two = green("\"absorption\"\nabsorption = { depth_layers = 2 }");
+        assert_eq!(two.count_of("body-depths"), 3);
         let diffusing = green("\"diffusion\"");
         assert_eq!(
             names(&diffusing),
@@ -622,7 +622,7 @@ mod tests {
         assert_eq!(diffusing.count_of("diffuse"), 6);
         let both = green("\"diffusion\"\ndiffusion = { core = \"pixel\", translucency = 1.0 }");
         assert_eq!(both.count_of("diffuse"), 4);
-        assert_eq!(both.count_of("body-depths"), 3);
+        assert_eq!(both.count_of("body-depths"), 1);
         assert_eq!(both.count_of("shadow"), 0);
         assert_eq!(gooey.count_of("blur"), 3);
         assert_eq!(gooey.count_of("planes-full"), 0);

@@ -99,7 +99,7 @@ impl Green {
         self.lookup.write(gpu, &wrap_light(section).table());
         let ramp = self.told_ramp.clone().unwrap_or_else(|| {
             layered_ramp(
-                &section.layers.map(Layer::from),
+                &four_layers(section),
                 section.layer_depth_max_m * self.mean_bottoms,
                 section.absorption.ramp_length_m,
                 section.absorption.way_share,
@@ -189,7 +189,7 @@ pub fn green_uniform(
     let absorption = &section.absorption;
     let mut looks = disc(absorption.samples as usize);
     looks.resize(32, Vec2::ZERO);
-    let deepest = Layer::from(section.layers[LAYERS - 1]);
+    let deepest = four_layers(section)[LAYERS - 1];
     let attenuation = absorption.way_share * deepest.diffuse_attenuation_per_m();
     let (at_pixel, _) = shares(section, texels_per_m);
     let mut green = GreenUniform {
@@ -215,6 +215,12 @@ pub fn green_uniform(
         green.spans[k] = span(light, matrix).to_array();
     }
     green
+}
+
+/// The four layers of one texture; the last is repeated below.
+fn four_layers(section: &SurfaceSection) -> [Layer; LAYERS] {
+    let last = section.layers.len() - 1;
+    std::array::from_fn(|layer| section.layers[layer.min(last)].into())
 }
 
 /// Scales of a light's map, as `shaders/green.wgsl` has them.

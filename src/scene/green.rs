@@ -97,9 +97,9 @@ impl Default for AbsorptionSection {
             ramp_length_m: 0.04,
             way_share: 0.5,
             glow: 0.35,
-            samples: 8,
+            samples: 4,
             disc_radius_m: 0.002,
-            depth_layers: 2,
+            depth_layers: 1,
             grow_m: 0.0005,
         }
     }
