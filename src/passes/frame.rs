@@ -619,9 +619,9 @@ mod tests {
                 "tonemap"
             ]
         );
-        assert_eq!(diffusing.count_of("diffuse"), 6);
-        let both = green("\"diffusion\"\ndiffusion = { core = \"pixel\", translucency = 1.0 }");
-        assert_eq!(both.count_of("diffuse"), 4);
+        assert_eq!(diffusing.count_of("diffuse"), 4);
+        let both = green("\"diffusion\"\ndiffusion = { core = \"map\", translucency = 1.0 }");
+        assert_eq!(both.count_of("diffuse"), 6);
         assert_eq!(both.count_of("body-depths"), 1);
         assert_eq!(both.count_of("shadow"), 0);
         assert_eq!(gooey.count_of("blur"), 3);

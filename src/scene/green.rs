@@ -126,9 +126,9 @@ impl AbsorptionSection {
 #[serde(rename_all = "kebab-case")]
 pub enum DiffusionCore {
     /// Lit at the pixel: on an organ it is narrower than a texel, and two blurs are saved.
+    #[default]
     Pixel,
     /// Blurred in the light map like the others, as far as its texels are fine enough.
-    #[default]
     Map,
 }
 
