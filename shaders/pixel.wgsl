@@ -113,10 +113,14 @@ fn wet(at: Pixel, unshadowed: f32) -> vec3f {
         let lit = light_at(3u, at.world);
         sum += lit.irradiance * highlight(at.relief, lit.to_light, at.to_eye, frame.roughness);
     }
+    return frame.wetness * sum + mirrored(at);
+}
+
+// The room in the wet film.
+fn mirrored(at: Pixel) -> vec3f {
     let cosine = max(dot(at.relief, at.to_eye), 0.0);
-    let mirrored = 2.0 * dot(at.relief, at.to_eye) * at.relief - at.to_eye;
+    let direction = 2.0 * dot(at.relief, at.to_eye) * at.relief - at.to_eye;
     // Where the tissue itself stands in the way of the mirrored ray there is no room to see.
-    let open = clamp(1.0 + 1.6 * dot(mirrored, at.normal), 0.0, 1.0);
-    sum += open * fresnel(cosine) * theatre(mirrored);
-    return frame.wetness * sum;
+    let open = clamp(1.0 + 1.6 * dot(direction, at.normal), 0.0, 1.0);
+    return frame.wetness * open * fresnel(cosine) * theatre(direction);
 }

@@ -153,7 +153,7 @@ fn worst_frame(gpu: &Gpu, body: &GpuBody, points: &[Vec3]) -> (f32, f32) {
     body.frame(gpu, points, |_, _| {});
     let tangents = read(gpu, &body.tangents.tangents);
     let gradients = read(gpu, &body.tangents.uv_gradients);
-    let twin = twin_frames(&body, points);
+    let twin = twin_frames(body, points);
     let longest = twin
         .iter()
         .flat_map(|frame| frame.uv_gradients)
@@ -511,7 +511,7 @@ fn worst_carried(gpu: &Gpu, body: &GpuBody, points: &[Vec3], source: &str) -> f3
     let pass = PlaneCarried::with_source(gpu, &body.mesh, &local, &body.tangents, source)
         .expect("the pass is built");
     body.frame(gpu, points, |encoder, timer| pass.record(encoder, timer));
-    let frames = twin_frames(&body, points);
+    let frames = twin_frames(body, points);
     let normals = body.twin_normals(points);
     let twin: Vec<Plane> = body
         .mesh

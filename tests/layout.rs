@@ -4,9 +4,12 @@
 
 use palpate::geom::moments::PatchSums;
 use palpate::gpu::{Wgsl, join};
+use palpate::passes::body_depths::{BodyDepthUniform, BodyDepths};
 use palpate::passes::depth_maps::{DepthMaps, LightViews};
+use palpate::passes::diffusion::{DiffuseUniform, Diffusion};
 use palpate::passes::exit::Exit;
 use palpate::passes::geometry::Geometry;
+use palpate::passes::green::GreenUniform;
 use palpate::passes::light_path::CoverKind;
 use palpate::passes::lightmap::{BlurUniform, LightMap};
 use palpate::passes::moved_leaves::{self, ListedParams, MovedLeaves};
@@ -64,6 +67,22 @@ fn shaders() -> Vec<(&'static str, &'static [Wgsl])> {
             "gooey",
             Surface::wgsl(SurfaceKind::Gooey, CoverKind::Planes),
         ),
+        ("wrap", Surface::wgsl(SurfaceKind::Wrap, CoverKind::Planes)),
+        (
+            "absorption",
+            Surface::wgsl(SurfaceKind::Absorption, CoverKind::Planes),
+        ),
+        (
+            "diffusion",
+            Surface::wgsl(SurfaceKind::Diffusion, CoverKind::Planes),
+        ),
+        ("body depths", BodyDepths::WGSL),
+        ("diffusion map", Diffusion::WGSL),
+        (
+            "diffusion map of a translucent body",
+            Diffusion::TRANSLUCENT_WGSL,
+        ),
+        ("diffuse", Diffusion::BLUR_WGSL),
         ("tone map", ToneMap::WGSL),
         ("tools", Tools::WGSL),
     ]
@@ -214,6 +233,46 @@ fn mirrors() -> Vec<Mirror> {
             }
         ),
         mirror!(LightMap::BLUR_WGSL, "Blur", BlurUniform { taps }),
+        mirror!(
+            BodyDepths::WGSL,
+            "BodyDepth",
+            BodyDepthUniform {
+                clip_from_world,
+                grow_m,
+                pad0,
+                pad1,
+                pad2
+            }
+        ),
+        mirror!(
+            Diffusion::BLUR_WGSL,
+            "Diffuse",
+            DiffuseUniform {
+                sigma_m,
+                own,
+                second,
+                first
+            }
+        ),
+        mirror!(
+            Surface::wgsl(SurfaceKind::Absorption, CoverKind::Planes),
+            "Green",
+            GreenUniform {
+                clip_from_world,
+                spans,
+                disc,
+                attenuation,
+                core,
+                disc_radius_m,
+                glow,
+                ramp_per_m,
+                color_in_map,
+                translucency,
+                pad0,
+                pad1,
+                pad2
+            }
+        ),
         mirror!(shading, "Light", LightUniform { place, power }),
         mirror!(
             shading,

@@ -1,5 +1,6 @@
 //! The live knobs of a surface, those of Norberg's figure 15 among them.
 
+use super::green_knobs as green;
 use super::panel::PanelAsk;
 use crate::scene::{Quadrature, SurfaceKind, SurfaceSection, UvMetric};
 use egui::{ComboBox, Slider, Ui};
@@ -11,14 +12,22 @@ pub fn surface(ui: &mut Ui, surface: &mut SurfaceSection) -> Option<PanelAsk> {
         SurfaceKind::Plain => {}
         SurfaceKind::Subsurface => subsurface(ui, surface),
         SurfaceKind::Gooey => gooey(ui, surface),
+        SurfaceKind::Wrap => green::lookup(ui, surface),
+        SurfaceKind::Absorption => {
+            green::lookup(ui, surface);
+            green::absorption(ui, surface);
+        }
+        SurfaceKind::Diffusion => green::diffusion(ui, surface),
     }
-    if surface.kind != SurfaceKind::Plain {
+    if surface.kind.looks_below() || surface.kind == SurfaceKind::Diffusion {
         ui.horizontal(|ui| {
             for metric in [UvMetric::Deformed, UvMetric::Unit] {
                 ui.selectable_value(&mut surface.uv_metric, metric, metric.name());
             }
             ui.label("texture metric");
         });
+    }
+    if surface.kind.looks_below() {
         ui.checkbox(
             &mut surface.thickness_follows_volume,
             "layers keep their volume",
@@ -32,6 +41,7 @@ pub fn surface(ui: &mut Ui, surface: &mut SurfaceSection) -> Option<PanelAsk> {
         (
             (s.samples, s.quadrature, s.blur_passes, s.light_map_size_px),
             (s.uv_metric, s.thickness_follows_volume),
+            green::rebuilt(s),
         )
     };
     if rebuilt(surface) != rebuilt(&before) {

@@ -7,6 +7,8 @@ use crate::geom::paint::{TissueMaps, paint};
 use crate::geom::tet::{lumped_masses_kg, skin};
 use crate::geom::unwrap::unwrap;
 use crate::geom::{Embedding, SurfaceMesh, TetMesh, bounds};
+use crate::optics::absorption::RAMP_LENGTH;
+use crate::optics::tone::linear_from_srgb;
 use crate::scene::{BodySection, MapFiles, RestBox, Scene, SceneSource, Shape};
 use crate::sim::BodySetup;
 use glam::Vec3;
@@ -193,6 +195,27 @@ pub fn maps(section: &BodySection, mesh: &SurfaceMesh) -> Result<TissueMaps, App
         layers: layers.iter().map(same_size).collect::<Result<_, _>>()?,
         outer,
     })
+}
+
+/// The colours of a ramp: the first row of the picture at `path`, linear, spread evenly over a ramp.
+///
+/// # Errors
+///
+/// [`AppError::Map`] if the file is no picture.
+pub fn ramp(path: &Path) -> Result<Vec<Vec3>, AppError> {
+    let image = picture(path)?.to_rgba8();
+    let last = image.width() - 1;
+    let linear = |column: u32| {
+        let [r, g, b, _] = image.get_pixel(column, 0).0;
+        Vec3::from_array([r, g, b].map(|byte| linear_from_srgb(f32::from(byte) / 255.0)))
+    };
+    Ok((0..RAMP_LENGTH)
+        .map(|i| {
+            let at = i as f32 / (RAMP_LENGTH - 1) as f32 * last as f32;
+            let low = (at as u32).min(last);
+            linear(low).lerp(linear((low + 1).min(last)), at.fract())
+        })
+        .collect())
 }
 
 /// A picture with as many bits a channel as the file has.

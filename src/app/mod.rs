@@ -4,6 +4,7 @@ mod assets;
 mod check;
 mod dump;
 mod error;
+mod green_knobs;
 mod hand;
 mod heat;
 mod history;

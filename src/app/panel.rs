@@ -334,11 +334,14 @@ fn surface_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAsk>)
     ui.separator();
     ui.strong("Surface");
     let surface = &mut session.scene.surface;
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         for kind in [
             SurfaceKind::Plain,
             SurfaceKind::Gooey,
             SurfaceKind::Subsurface,
+            SurfaceKind::Wrap,
+            SurfaceKind::Absorption,
+            SurfaceKind::Diffusion,
         ] {
             if ui
                 .selectable_value(&mut surface.kind, kind, kind.name())

@@ -64,7 +64,7 @@ impl Renderer {
         tissue: Arc<TissueMaps>,
         size: [u32; 2],
     ) -> Result<Self, AppError> {
-        let passes = FramePasses::new(
+        let mut passes = FramePasses::new(
             &gpu,
             &session.scene,
             &session.rest,
@@ -72,6 +72,11 @@ impl Renderer {
             &tissue,
             size,
         )?;
+        if session.scene.surface.is_translucent()
+            && let Some(path) = &session.scene.surface.absorption.ramp
+        {
+            passes.set_ramp(&gpu, load::ramp(path)?);
+        }
         Ok(Self {
             timer: Timer::new(&gpu, TIMED_PASSES_MAX),
             gpu,
@@ -101,7 +106,7 @@ impl Renderer {
 
     /// Takes over changed knobs of the surface.
     pub fn set_knobs(&mut self, scene: &Scene) {
-        self.passes.set_knobs(&scene.surface);
+        self.passes.set_knobs(&self.gpu, &scene.surface);
     }
 
     /// The camera that the scene asks for; moved back where the picture is narrow.

@@ -2,6 +2,7 @@
 //!
 //! Nothing here knows of time, of the GPU or of scene files.
 
+pub mod chart;
 pub mod export;
 pub mod import;
 pub mod lattice;

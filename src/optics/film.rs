@@ -5,7 +5,7 @@
 use glam::Vec3;
 
 /// ((n − 1) / (n + 1))² for n = 1.38: tissue under a film of water.
-const FILM_F0: f32 = 0.025_492_6;
+pub const FILM_F0: f32 = 0.025_492_6;
 
 /// Fresnel reflectance by Schlick's approximation.
 pub fn fresnel(cosine: f32) -> f32 {

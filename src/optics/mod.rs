@@ -2,8 +2,10 @@
 //!
 //! Directions point away from the place that scatters: `to_light` to the light, `to_eye` to the eye.
 
+pub mod absorption;
 pub mod blur;
 pub mod closed_form;
+pub mod diffusion;
 pub mod film;
 pub mod layers;
 pub mod light_entry;
@@ -14,6 +16,7 @@ pub mod medium;
 pub mod pack;
 pub mod stack;
 pub mod tone;
+pub mod wrap_lookup;
 
 use glam::Vec3;
 

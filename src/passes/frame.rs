@@ -1,9 +1,12 @@
 //! The passes of a scene, and one frame of them in order.
 
+use super::body_depths::BodyDepths;
 use super::depth_maps::DepthMaps;
+use super::diffusion::{Diffusion, DiffusionInputs};
 use super::draw::Target;
 use super::exit::Exit;
 use super::geometry::{Geometry, GeometryTargets};
+use super::green::Green;
 use super::light_path::{LightPath, LightPathKnobs, RefitCounts, patch_share};
 use super::lightmap::{LightMap, uv_per_m};
 use super::maps::Maps;
@@ -48,6 +51,11 @@ impl FramePlan {
         let by_depth = method == Some(LightPathMethod::DepthMap);
         let gooey = kind == SurfaceKind::Gooey;
         let blurs = scene.surface.blur_passes;
+        let translucent = scene.surface.is_translucent();
+        let body_depths =
+            BodyDepths::draws(scene.lights.len(), scene.surface.absorption.depth_layers);
+        let diffusion = kind == SurfaceKind::Diffusion;
+        let diffuse = 2 * Diffusion::blurred_gaussians(&scene.surface).len() as u32;
         let all = [
             (Tangents::NAME, 2, true),
             (
@@ -73,13 +81,19 @@ impl FramePlan {
             ),
             (DepthMaps::NAME, scene.lights.len() as u32, by_depth),
             (Exit::NAME, 1, by_depth),
-            (Shadow::NAME, 1, shadow && !by_depth),
+            (BodyDepths::NAME, body_depths, translucent),
+            (Shadow::NAME, 1, shadow && !by_depth && !translucent),
             (LightMap::NAME, 1, gooey),
             (LightMap::BLUR_NAME, blurs, gooey && blurs > 0),
+            (Diffusion::NAME, 1, diffusion),
+            (Diffusion::BLUR_NAME, diffuse, diffusion),
             (Geometry::NAME, 1, true),
             ("plain", 1, kind == SurfaceKind::Plain),
             ("subsurface", 1, kind == SurfaceKind::Subsurface),
             ("gooey", 1, gooey),
+            ("wrap", 1, kind == SurfaceKind::Wrap),
+            ("absorption", 1, kind == SurfaceKind::Absorption),
+            ("diffusion", 1, diffusion),
             (Tools::NAME, 1, !scene.tools.is_empty()),
             (ToneMap::NAME, 1, true),
         ];
@@ -138,6 +152,8 @@ pub struct FramePasses {
     depth_maps: Option<DepthMaps>,
     exit: Option<Exit>,
     light_map: Option<LightMap>,
+    green: Option<Green>,
+    diffusion: Option<Diffusion>,
     geometry: Geometry,
     surface: Surface,
     maps: Maps,
@@ -157,13 +173,28 @@ pub struct FramePasses {
 fn shadow_map<'a>(
     shadow: Option<&'a Shadow>,
     depth_maps: Option<&'a DepthMaps>,
+    green: Option<&'a Green>,
     none: &'a Target,
 ) -> &'a Target {
     let of_all = depth_maps.map(|maps| &maps.depth);
+    let entries = green.and_then(Green::depths).map(BodyDepths::entries);
     shadow
         .map(|shadow| &shadow.target)
         .or(of_all)
+        .or(entries)
         .unwrap_or(none)
+}
+
+/// The light map that the surface reads; any texture where it reads none.
+fn read_light_map<'a>(
+    gooey: Option<&'a LightMap>,
+    diffusion: Option<&'a Diffusion>,
+    maps: &'a Maps,
+) -> &'a wgpu::TextureView {
+    gooey
+        .map(LightMap::view)
+        .or(diffusion.map(Diffusion::view))
+        .unwrap_or(&maps.outer)
 }
 
 /// How far light is followed below the surface of a scene [m]: the told radius, or from the densest layer's extinction.
@@ -227,7 +258,19 @@ impl FramePasses {
         } else {
             None
         };
-        let shadow = if depth_maps.is_none() && lights.iter().any(|light| light.shadow) {
+        let green = if matches!(
+            scene.surface.kind,
+            SurfaceKind::Wrap | SurfaceKind::Absorption | SurfaceKind::Diffusion
+        ) {
+            let count = lights.len();
+            let green = Green::new(gpu, &scene.surface, count, surface_mesh, &tangents, tissue)?;
+            Some(green)
+        } else {
+            None
+        };
+        // And so do those of light that comes through the body.
+        let has_entries = depth_maps.is_some() || scene.surface.is_translucent();
+        let shadow = if !has_entries && lights.iter().any(|light| light.shadow) {
             Some(Shadow::new(gpu, surface_mesh)?)
         } else {
             None
@@ -252,7 +295,30 @@ impl FramePasses {
         let constants = light_constants(&lights);
         let maps = Maps::new(gpu, tissue);
         let no_shadow = Target::new(gpu, "no shadow", [1; 2], DEPTH_FORMAT);
-        let shadow_map = shadow_map(shadow.as_ref(), depth_maps.as_ref(), &no_shadow);
+        let shadow_map = shadow_map(
+            shadow.as_ref(),
+            depth_maps.as_ref(),
+            green.as_ref(),
+            &no_shadow,
+        );
+        let diffusion = match &green {
+            Some(green) if scene.surface.kind == SurfaceKind::Diffusion => Some(Diffusion::new(
+                gpu,
+                &scene.surface,
+                surface_mesh,
+                &DiffusionInputs {
+                    frame: &frame,
+                    light_constants: &constants,
+                    mesh: &mesh,
+                    tangents: &tangents,
+                    maps: &maps,
+                    map_size_px: tissue.size_px,
+                    shadow_map: &shadow_map.view,
+                    green,
+                },
+            )?),
+            _ => None,
+        };
         let light_map = if scene.surface.kind == SurfaceKind::Gooey {
             Some(LightMap::new(
                 gpu,
@@ -286,10 +352,11 @@ impl FramePasses {
                 cover: light_path.primitives().cover(),
                 geometry: &targets,
                 maps: &maps,
-                light_map: light_map.as_ref().map_or(&maps.outer, LightMap::view),
+                light_map: read_light_map(light_map.as_ref(), diffusion.as_ref(), &maps),
                 shadow_map: &shadow_map.view,
                 exit_map: &exit.as_ref().map_or(shadow_map, |exit| &exit.target).view,
                 depth_maps: depth_maps.as_ref(),
+                green: green.as_ref(),
             },
         )?;
         let radiance = Target::new(gpu, "radiance", size, RADIANCE_FORMAT);
@@ -306,6 +373,8 @@ impl FramePasses {
             depth_maps,
             exit,
             light_map,
+            green,
+            diffusion,
             geometry,
             surface,
             maps,
@@ -337,7 +406,8 @@ impl FramePasses {
             exit.resize(gpu, size);
         }
         let depth_maps = self.depth_maps.as_ref();
-        let shadow_map = shadow_map(self.shadow.as_ref(), depth_maps, &self.no_shadow);
+        let green = self.green.as_ref();
+        let shadow_map = shadow_map(self.shadow.as_ref(), depth_maps, green, &self.no_shadow);
         self.surface.rebind(
             gpu,
             &SurfaceInputs {
@@ -346,10 +416,11 @@ impl FramePasses {
                 cover: self.light_path.primitives().cover(),
                 geometry: &self.targets,
                 maps: &self.maps,
-                light_map: self
-                    .light_map
-                    .as_ref()
-                    .map_or(&self.maps.outer, LightMap::view),
+                light_map: read_light_map(
+                    self.light_map.as_ref(),
+                    self.diffusion.as_ref(),
+                    &self.maps,
+                ),
                 shadow_map: &shadow_map.view,
                 exit_map: &self
                     .exit
@@ -357,6 +428,7 @@ impl FramePasses {
                     .map_or(shadow_map, |exit| &exit.target)
                     .view,
                 depth_maps,
+                green,
             },
         );
         self.tone_map = ToneMap::new(gpu, &self.radiance, &self.targets.depth)?;
@@ -375,8 +447,23 @@ impl FramePasses {
     }
 
     /// Takes over changed knobs of the surface; what needs other passes needs [`FramePasses::new`].
-    pub fn set_knobs(&mut self, section: &SurfaceSection) {
+    pub fn set_knobs(&mut self, gpu: &Gpu, section: &SurfaceSection) {
         self.knobs = section.clone();
+        if let Some(green) = &self.green {
+            green.set_knobs(gpu, section);
+        }
+    }
+
+    /// Takes `colors`, evenly from no way to the longest, for what is left of light that comes through the body.
+    pub fn set_ramp(&mut self, gpu: &Gpu, colors: Vec<Vec3>) {
+        if let Some(green) = &mut self.green {
+            green.set_ramp(gpu, &self.knobs, colors);
+        }
+    }
+
+    /// The light map of the surface `diffusion`.
+    pub fn diffusion(&self) -> Option<&Diffusion> {
+        self.diffusion.as_ref()
     }
 
     /// Records one frame: the surface lies at `points`, seen by `view`, with `tools` over it.
@@ -425,6 +512,15 @@ impl FramePasses {
         if let Some(light_map) = &self.light_map {
             let radius = self.knobs.blur_radius_m * self.uv_per_m;
             light_map.record(gpu, radius, &self.mesh, encoder, timer);
+        }
+        // Where light that comes through the body enters and leaves it.
+        if let Some(green) = &self.green {
+            let lights = &self.lights;
+            green.record(gpu, &self.knobs, lights, points, &self.mesh, encoder, timer);
+        }
+        // Irradiance in texture space, blurred by as far as light wanders.
+        if let Some(diffusion) = &self.diffusion {
+            diffusion.record(gpu, &self.knobs, &self.mesh, encoder, timer);
         }
         // What lies at each pixel.
         self.geometry
@@ -532,6 +628,44 @@ mod tests {
                 "one map serves both"
             );
         }
+        let green = |text: &str| plan(&format!("shadow = true\n[surface]\nkind = {text}"));
+        assert_eq!(
+            names(&green("\"wrap\"")),
+            ["tangents", "shadow", "geometry", "wrap", "tonemap"]
+        );
+        let absorbing = green("\"absorption\"");
+        assert_eq!(
+            names(&absorbing),
+            [
+                "tangents",
+                "body-depths",
+                "geometry",
+                "absorption",
+                "tonemap"
+            ],
+            "its first entries are the shadow map"
+        );
+        assert_eq!(absorbing.count_of("body-depths"), 1);
+        let two = green("\"absorption\"\nabsorption = { depth_layers = 2 }");
+        assert_eq!(two.count_of("body-depths"), 3);
+        let diffusing = green("\"diffusion\"");
+        assert_eq!(
+            names(&diffusing),
+            [
+                "tangents",
+                "shadow",
+                "diffusion-map",
+                "diffuse",
+                "geometry",
+                "diffusion",
+                "tonemap"
+            ]
+        );
+        assert_eq!(diffusing.count_of("diffuse"), 4);
+        let both = green("\"diffusion\"\ndiffusion = { core = \"map\", translucency = 1.0 }");
+        assert_eq!(both.count_of("diffuse"), 6);
+        assert_eq!(both.count_of("body-depths"), 1);
+        assert_eq!(both.count_of("shadow"), 0);
         assert_eq!(gooey.count_of("blur"), 3);
         assert_eq!(gooey.count_of("planes-full"), 0);
     }

@@ -29,10 +29,7 @@ pub struct GeometryTargets {
 impl GeometryTargets {
     /// Targets of `size` [px] for a model of `kind`. What is not covered is never written.
     pub fn new(gpu: &Gpu, kind: SurfaceKind, size: [u32; 2]) -> Self {
-        let detail_size = match kind {
-            SurfaceKind::Plain => [1; 2],
-            SurfaceKind::Subsurface | SurfaceKind::Gooey => size,
-        };
+        let detail_size = if kind.looks_below() { size } else { [1; 2] };
         Self {
             base: Target::new(gpu, "base", size, FORMAT),
             detail: Target::new(gpu, "detail", detail_size, FORMAT),
@@ -91,7 +88,7 @@ impl Geometry {
         primitives: Primitives<'_>,
     ) -> Result<Self, GpuError> {
         // Only what lies below the surface is looked for with planes and gradients.
-        let has_detail = section.kind != SurfaceKind::Plain;
+        let has_detail = section.kind.looks_below();
         let unit_frames = section.uv_metric == UvMetric::Unit;
         let rest_gradients = if unit_frames || section.thickness_follows_volume {
             Some(storage(

@@ -38,7 +38,7 @@ pub enum LightPath {
     /// The planes near moved points anew.
     Incremental(PlaneIncremental),
     /// The same from sixteen samples each, or paraboloids from those.
-    Sampled(SampledFit),
+    Sampled(Box<SampledFit>),
 }
 
 /// Radius of the patches of a method as a share of how far light is followed: a paraboloid, which passes through its
@@ -174,9 +174,9 @@ impl LightPath {
                     skip_m,
                 };
                 let rest = [points, &normals[..]];
-                Self::Sampled(SampledFit::new(
+                Self::Sampled(Box::new(SampledFit::new(
                     gpu, fit, rest, &patches, buffers, tangents,
-                )?)
+                )?))
             }
         })
     }

@@ -1,11 +1,14 @@
 //! One GPU pass a file. A pass owns the buffers it writes and is immutable once made.
 
 pub mod backdrop;
+pub mod body_depths;
 pub mod depth_maps;
+pub mod diffusion;
 pub mod draw;
 pub mod exit;
 pub mod frame;
 pub mod geometry;
+pub mod green;
 pub mod light_path;
 pub mod lightmap;
 pub mod maps;

@@ -3,6 +3,7 @@
 use super::depth_maps::DepthMaps;
 use super::draw::{DepthUse, Draw, DrawKind, Target, cleared, read_depth};
 use super::geometry::GeometryTargets;
+use super::green::Green;
 use super::light_path::CoverKind;
 use super::maps::Maps;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join};
@@ -29,6 +30,8 @@ pub struct SurfaceInputs<'a> {
     pub exit_map: &'a wgpu::TextureView,
     /// The maps of all lights, for [`CoverKind::DepthMaps`]; `shadow_map` is their depth.
     pub depth_maps: Option<&'a DepthMaps>,
+    /// What the surfaces after Green (2004) read more.
+    pub green: Option<&'a Green>,
 }
 
 /// The draw of the tissue.
@@ -93,6 +96,38 @@ impl Surface {
                 "pixel.wgsl",
                 "layers.wgsl",
                 "gooey.wgsl"
+            ],
+            SurfaceKind::Wrap => crate::wgsl![
+                "frame.wgsl",
+                "pack.wgsl",
+                "film.wgsl",
+                "light.wgsl",
+                "pixel.wgsl",
+                "green_pixel.wgsl",
+                "wrap_lookup.wgsl",
+                "wrap.wgsl"
+            ],
+            SurfaceKind::Absorption => crate::wgsl![
+                "frame.wgsl",
+                "pack.wgsl",
+                "film.wgsl",
+                "light.wgsl",
+                "pixel.wgsl",
+                "green_pixel.wgsl",
+                "green.wgsl",
+                "wrap_lookup.wgsl",
+                "body_light.wgsl",
+                "absorption.wgsl"
+            ],
+            SurfaceKind::Diffusion => crate::wgsl![
+                "frame.wgsl",
+                "pack.wgsl",
+                "film.wgsl",
+                "light.wgsl",
+                "pixel.wgsl",
+                "green_pixel.wgsl",
+                "green.wgsl",
+                "diffusion.wgsl"
             ],
         }
     }
@@ -161,6 +196,9 @@ impl Surface {
                 constants.push(("MIRRORED", 1.0));
             }
         }
+        if section.kind == SurfaceKind::Absorption {
+            constants.extend(Green::constants(section));
+        }
         let draw = Draw::new(
             gpu,
             &DrawKind {
@@ -213,7 +251,7 @@ impl Surface {
     }
 }
 
-/// The bindings of `shaders/pixel.wgsl`, in its order, and of `shaders/light_depth.wgsl`.
+/// The bindings of `shaders/pixel.wgsl`, in its order, and of `shaders/light_depth.wgsl` or `shaders/green.wgsl`.
 fn bindings<'a>(inputs: &SurfaceInputs<'a>) -> Vec<Binding<'a>> {
     let mut bindings = vec![
         Binding::Uniform(inputs.frame),
@@ -228,6 +266,10 @@ fn bindings<'a>(inputs: &SurfaceInputs<'a>) -> Vec<Binding<'a>> {
         Binding::Texture(inputs.light_map),
         Binding::Depth(inputs.shadow_map),
     ];
+    if let Some(green) = inputs.green {
+        bindings.extend(green.bindings());
+        return bindings;
+    }
     // What one cover reads is bound for all: the layers beyond the fourth follow it.
     let none = (inputs.frame, &inputs.geometry.base.view, inputs.shadow_map);
     let (views, normals, exits) = inputs.depth_maps.map_or(none, |maps| {

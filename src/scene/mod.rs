@@ -8,6 +8,7 @@ mod body;
 mod camera;
 mod check;
 mod error;
+mod green;
 mod light;
 pub mod overrides;
 mod place;
@@ -17,6 +18,7 @@ mod tool;
 pub use body::{Ball, BodySection, HalfSpace, MapFiles, Region, Shape};
 pub use camera::*;
 pub use error::SceneError;
+pub use green::*;
 pub use light::*;
 pub use place::RestBox;
 pub use surface::*;
@@ -159,6 +161,9 @@ impl Scene {
             toml::from_str(source.text).map_err(|e| SceneError::toml(source.name, &e))?;
         if let Some(folder) = source.folder {
             scene.body.resolve_files(folder);
+            if let Some(ramp) = &mut scene.surface.absorption.ramp {
+                *ramp = folder.join(&*ramp);
+            }
         }
         let scene = overrides::apply(source.name, scene, sets)?;
         scene.check(source.name)?;

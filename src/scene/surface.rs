@@ -1,6 +1,7 @@
 //! `[surface]`: the one surface model of a scene, its layers and its knobs.
 
 use super::check::Checker;
+use super::green::{AbsorptionSection, DiffusionSection, LookupSection};
 use crate::optics::{LAYERS_MAX, Layer};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -35,7 +36,7 @@ pub struct SurfaceSection {
     pub blur_passes: u32,
     /// `gooey`: multiplies the opacity of the outer layer.
     pub outer_opacity: f32,
-    /// `gooey`: side of the light map [px].
+    /// `gooey`, `diffusion`: side of the light map [px].
     pub light_map_size_px: u32,
     /// How texture coordinates below the surface follow it as it stretches.
     pub uv_metric: UvMetric,
@@ -49,6 +50,12 @@ pub struct SurfaceSection {
     pub wetness: f32,
     /// Multiplies radiance before the tone map.
     pub exposure: f32,
+    /// `wrap` and `absorption`: the table of wrapped light.
+    pub lookup: LookupSection,
+    /// `absorption`, and `diffusion` where it asks: light that comes through the body.
+    pub absorption: AbsorptionSection,
+    /// `diffusion`: how far light wanders.
+    pub diffusion: DiffusionSection,
 }
 
 /// The surface models.
@@ -62,6 +69,12 @@ pub enum SurfaceKind {
     Subsurface,
     /// Two layers with parallax and a blurred light map: Oat 2006.
     Gooey,
+    /// Light wrapped round the terminator, from a table: Green 2004, 16.2.
+    Wrap,
+    /// Wrapped light, and light that comes through the body: Green 2004, 16.3.
+    Absorption,
+    /// Light diffused in texture space: Green 2004, 16.4.
+    Diffusion,
 }
 
 impl SurfaceKind {
@@ -71,7 +84,15 @@ impl SurfaceKind {
             Self::Plain => "plain",
             Self::Subsurface => "subsurface",
             Self::Gooey => "gooey",
+            Self::Wrap => "wrap",
+            Self::Absorption => "absorption",
+            Self::Diffusion => "diffusion",
         }
+    }
+
+    /// Whether the model looks below the surface, by planes and gradients.
+    pub fn looks_below(self) -> bool {
+        matches!(self, Self::Subsurface | Self::Gooey)
     }
 }
 
@@ -165,11 +186,23 @@ impl Default for SurfaceSection {
             roughness: 0.24,
             wetness: 1.0,
             exposure: 1.0,
+            lookup: LookupSection::default(),
+            absorption: AbsorptionSection::default(),
+            diffusion: DiffusionSection::default(),
         }
     }
 }
 
 impl SurfaceSection {
+    /// Whether light that comes through the body is drawn, so that depth maps are needed.
+    pub fn is_translucent(&self) -> bool {
+        match self.kind {
+            SurfaceKind::Absorption => true,
+            SurfaceKind::Diffusion => self.diffusion.translucency > 0.0,
+            _ => false,
+        }
+    }
+
     /// Extinction σ_t [1/m] that bounds how far light wanders: of the densest layer, in the colour that
     /// reaches farthest there. The outermost one is a clear skin that light crosses in a moment.
     pub fn bounding_extinction_per_m(&self) -> f32 {
@@ -237,6 +270,9 @@ impl SurfaceSection {
                 "it reads the area from the deformed metric: set surface.uv_metric to \"deformed\"",
             );
         }
+        self.lookup.check(c);
+        self.absorption.check(c);
+        self.diffusion.check(c);
         c.range("surface.roughness", self.roughness, 0.02, 1.0);
         c.range(
             "surface.light_map_size_px",

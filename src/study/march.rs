@@ -634,6 +634,7 @@ fn chart(rows: &[Row<Cell, Measures>], scene: &str) -> ScatterChart {
                         .radiance_error_rel
                         .map(|e| e.max(ERROR_RANGE.0)),
                     label: row.measures.evaluations.to_string(),
+                    scale: 1.0,
                 })
             })
             .collect(),

@@ -403,6 +403,7 @@ fn chart(rows: &[Row<Cell, Measures>]) -> ScatterChart {
                 x: row.cell.vertices as f64,
                 y: row.cost.ms_p50,
                 label: row.measures.evaluations.to_string(),
+                scale: 1.0,
             })
             .collect(),
     };
