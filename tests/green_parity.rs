@@ -155,7 +155,7 @@ fn plain_maps(outer: image::RgbaImage) -> TissueMaps {
         size_px,
         normal: map([128, 128, 255, 255]),
         inner: map([255, 255, 255, 255]),
-        layers: map([60, 120, 180, 255]),
+        layers: vec![image::DynamicImage::ImageRgba8(map([60, 120, 180, 255]))],
         outer,
     }
 }
