@@ -396,7 +396,7 @@ fn light_path_section(
 fn solver_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAsk>) {
     ui.separator();
     ui.strong("Solver");
-    let taken = session.substeps();
+    let taken = session.solver();
     let solver = &mut session.scene.solver;
     let before = *solver;
     ComboBox::from_id_salt("solver")
@@ -413,8 +413,11 @@ fn solver_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAsk>) 
     );
     ui.add(Slider::new(&mut solver.poisson_ratio, 0.0..=0.49).text("Poisson ratio"));
     ui.add(Slider::new(&mut solver.substeps, 1..=60).text("substeps"));
-    if taken > solver.substeps {
-        ui.label(format!("{taken} are taken: the tissue is stiff"));
+    if taken.method != solver.method {
+        let (method, substeps) = (taken.method.name(), taken.substeps);
+        ui.label(format!(
+            "{method} is taken, in {substeps}: the tissue is stiff"
+        ));
     }
     ui.add(Slider::new(&mut solver.iterations, 1..=10).text("iterations"));
     if *solver != before {

@@ -13,13 +13,16 @@ use crate::measure::summary::{
 };
 use crate::measure::trace::{Span, write_trace};
 use crate::passes::frame::{FramePlan, effective_method};
-use crate::sim::ToolAction;
+use crate::sim::{Method, ToolAction};
 use std::path::Path;
 use std::sync::OnceLock;
 use std::time::Instant;
 
 /// Pictures that a report embeds; beyond that it takes them evenly.
 const REPORT_PICTURES_MAX: usize = 6;
+
+/// Residual over load beyond which a frame of the implicit method is not to be trusted.
+const UNSETTLED_SHARE: f32 = 0.2;
 
 static PROCESS_START: OnceLock<Instant> = OnceLock::new();
 
@@ -180,6 +183,7 @@ impl Recording {
         })
         .write(&out.join("report.html"))?;
         self.say(&summary, out);
+        self.say_unsettled(session);
         Ok(())
     }
 
@@ -240,6 +244,21 @@ impl Recording {
                 })
                 .collect(),
             first_frame_s: self.first_frame_s,
+        }
+    }
+
+    /// Warns where the implicit method stopped long before its forces were settled.
+    fn say_unsettled(&self, session: &Session) {
+        let unsettled = |record: &&FrameRecord| {
+            record.residual_rms.is_finite() && record.residual_rms > UNSETTLED_SHARE
+        };
+        let frames = self.records.iter().filter(unsettled).count();
+        if session.solver().method == Method::Implicit && frames > 0 {
+            eprintln!(
+                "in {frames} frames the implicit method left more than {:.0} % of the forces unsettled, and \
+                 what tools felt may be far off: use more iterations or a shorter time step",
+                100.0 * UNSETTLED_SHARE
+            );
         }
     }
 

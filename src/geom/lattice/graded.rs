@@ -16,9 +16,9 @@ use glam::{DVec3, Vec3};
 use std::collections::HashMap;
 
 /// Radius of the region of finest cells round the middle of the top face, as a share of the height.
-const CORE_SHARE: f64 = 0.0175;
+const CORE_SHARE: f64 = 0.028;
 /// So many times the finest cell is added for each radius of that region further out.
-const GROWTH: f64 = 1.5;
+const GROWTH: f64 = 2.4;
 /// More tetrahedra than this are refused: the ratio of the largest cell to the finest is limited
 /// by f32 before that.
 const GRADED_TETS_MAX: usize = 250_000;

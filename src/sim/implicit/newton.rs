@@ -26,7 +26,7 @@ const FORCING: f64 = 0.2;
 const REST_SHARE: f64 = 1e-5;
 /// The same over the elastic forces: the rounding of those.
 const ROUNDING_SHARE: f64 = 3e-7;
-const CG_ITERATIONS_MAX: usize = 200;
+const CG_ITERATIONS_MAX: usize = 2000;
 /// Times a step is shortened.
 const CUTS_MAX: usize = 10;
 /// Share of the fall of the energy that its slope promises, which is asked for (Armijo).
