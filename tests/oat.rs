@@ -193,7 +193,7 @@ fn maps(opacity: impl Fn(u32) -> u8, inner: impl Fn(u32) -> u8, bump: u8) -> Tis
     let outer = RgbaImage::from_fn(side, side, |x, _| Rgba([255, 255, 255, opacity(x)]));
     let inner = RgbaImage::from_fn(side, side, |x, _| Rgba([inner(x), inner(x), inner(x), 255]));
     let normal = RgbaImage::from_fn(side, side, |x, _| {
-        let lean = if x / 4 % 2 == 0 {
+        let lean = if (x / 4).is_multiple_of(2) {
             128 + bump
         } else {
             128 - bump
@@ -454,7 +454,7 @@ fn opaque_places_of_the_outer_layer_shade_the_light_map() {
 }
 
 fn stripes(x: u32) -> u8 {
-    if x / 24 % 2 == 0 { 230 } else { 60 }
+    if (x / 24).is_multiple_of(2) { 230 } else { 60 }
 }
 
 #[test]
