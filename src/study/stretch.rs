@@ -416,6 +416,16 @@ mod tests {
     }
 
     #[test]
+    fn the_blur_keeps_its_radius_with_the_metric_and_grows_with_the_stretch_without() {
+        let blur = |metric| row(metric, false, 1.5).measures.blur_error_rel.unwrap();
+        // Half floats: a thousandth.
+        let deformed = blur(UvMetric::Deformed);
+        assert!(deformed.abs() < 2e-3, "{deformed}");
+        let unit = blur(UvMetric::Unit);
+        assert!((unit - 0.5).abs() < 2e-3, "{unit}");
+    }
+
+    #[test]
     fn layers_keep_their_depth_with_the_metric_and_sink_by_the_stretch_without() {
         let depth = |metric, stretch| row(metric, true, stretch).measures.depth_error_rel.unwrap();
         // Gradients are packed in halves: a thousandth.
