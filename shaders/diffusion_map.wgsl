@@ -42,13 +42,6 @@ struct Varyings {
     @location(4) @interpolate(flat) chart: f32,
 }
 
-fn metric(gradient_u: vec3f, gradient_v: vec3f) -> vec3f {
-    let a = length(gradient_u);
-    let b = dot(gradient_u, gradient_v) / max(a, 1e-20);
-    let c = sqrt(max(dot(gradient_v, gradient_v) - b * b, 0.0));
-    return vec3f(a, b, c);
-}
-
 @vertex
 fn diffusion_map_vertex(@builtin(vertex_index) vertex: u32) -> Varyings {
     let point = point_of[vertex];

@@ -24,6 +24,10 @@ struct Frame {
     through: vec4f,
     // Width and height of the picture [px], and their inverses.
     size: vec4f,
+    // Colour of each inner layer, and its opacity.
+    inner: array<vec4f, 4>,
+    // Distance of each from the surface, in layer distances.
+    inner_distances: vec4f,
     layer_depth_max_m: f32,
     reach_m: f32,
     color_blend: f32,
@@ -39,9 +43,18 @@ struct Frame {
     shadow_bias_m: f32,
     // Level of the maps whose texels are as large as a pixel.
     map_level: f32,
+    // Radius of the disc that an inner layer is blurred by, as a share of the way to it.
+    inner_blur: f32,
+    // Share of the light that an opaque layer keeps from those below.
+    layer_shadow: f32,
+    // Radius of the disc that light is blurred by [m].
+    blur_radius_m: f32,
+    // How far noise moves where the march reads the layers [m].
+    noise_m: f32,
+    // Look-ups of the noise, each at the place that the one before tells.
+    noise_lookups: u32,
     pad0: f32,
     pad1: f32,
-    pad2: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

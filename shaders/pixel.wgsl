@@ -50,6 +50,14 @@ fn color_at(map: texture_2d<f32>, uv: vec2f) -> vec4f {
     return vec4f(texel.rgb * texel.rgb, texel.a);
 }
 
+// The normal with the bumps of the normal map, whose green points to smaller v.
+fn relief_at(uv: vec2f, normal: vec3f, tangent: vec3f, bitangent: vec3f) -> vec3f {
+    let bump = textureSampleLevel(normal_map, linear_sampler, uv, frame.map_level).xyz * 2.0 - 1.0;
+    return normalize(
+        frame.relief * (bump.x * tangent - bump.y * bitangent) + max(bump.z, 0.05) * normal,
+    );
+}
+
 fn pixel_at(at: vec4f) -> Pixel {
     let place = vec2i(at.xy);
     let base = textureLoad(base_map, place, 0);
@@ -68,11 +76,7 @@ fn pixel_at(at: vec4f) -> Pixel {
     let leaning = from_octahedral(base.w & 0xfffffffeu);
     let tangent = normalize(leaning - normal * dot(leaning, normal));
     let bitangent = select(1.0, -1.0, (base.w & 1u) != 0u) * cross(normal, tangent);
-    // Green of the map points to smaller v.
-    let bump = textureSampleLevel(normal_map, linear_sampler, uv, frame.map_level).xyz * 2.0 - 1.0;
-    let relief = normalize(
-        frame.relief * (bump.x * tangent - bump.y * bitangent) + max(bump.z, 0.05) * normal,
-    );
+    let relief = relief_at(uv, normal, tangent, bitangent);
     let across = vec2f(dot(to_eye, tangent), dot(to_eye, bitangent));
     let outer = color_at(outer_map, uv);
     return Pixel(world, normal, relief, to_eye, uv, across, tangent, bitangent, outer);

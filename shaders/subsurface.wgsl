@@ -12,7 +12,7 @@
 // before it: layers_four.wgsl, or layers_eight.wgsl.
 //
 // Source:  François 2006, Algorithms 1 and 2 with the faults mended that docs/METHODS.md lists; Norberg 2010,
-//          eqs. 10, 14 and 5.1 (colour).
+//          eqs. 10, 14, 3.1.2 (noise) and 5.1 (colour).
 // Twin:    src/optics/march.rs, fn march
 // Parity:  tests/shading_parity.rs, fn march_matches_the_cpu_twin
 // Threads: one a covered pixel.
@@ -298,7 +298,12 @@ fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
     );
     let cos_eye = dot(pixel.normal, pixel.to_eye);
     let deepest_m = thickness_of(detail) * frame.layer_depth_max_m;
-    let ray = Ray(pixel.world, pixel.to_eye, cos_eye, cover, pixel.uv, drift, deepest_m);
+    var uv = pixel.uv;
+    if NOISE != 0u {
+        let moved = frame.noise_m * noise_at(pixel.uv, at.xy);
+        uv += vec2f(dot(gradients.u, moved), dot(gradients.v, moved));
+    }
+    let ray = Ray(pixel.world, pixel.to_eye, cos_eye, cover, uv, drift, deepest_m);
 
     // What lies deep is seen where the ray meets it: that shift is the parallax of the vessels.
     let sunk = 0.35 * deepest_m / max(cos_eye, 0.35);

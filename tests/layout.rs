@@ -232,7 +232,17 @@ fn mirrors() -> Vec<Mirror> {
                 pad2
             }
         ),
-        mirror!(LightMap::BLUR_WGSL, "Blur", BlurUniform { taps }),
+        mirror!(
+            LightMap::BLUR_WGSL,
+            "Blur",
+            BlurUniform {
+                taps,
+                radius_m,
+                pad0,
+                pad1,
+                pad2
+            }
+        ),
         mirror!(
             BodyDepths::WGSL,
             "BodyDepth",
@@ -287,6 +297,8 @@ fn mirrors() -> Vec<Mirror> {
                 albedo,
                 through,
                 size,
+                inner,
+                inner_distances,
                 layer_depth_max_m,
                 reach_m,
                 color_blend,
@@ -300,9 +312,13 @@ fn mirrors() -> Vec<Mirror> {
                 shadow_depth_m,
                 shadow_bias_m,
                 map_level,
+                inner_blur,
+                layer_shadow,
+                blur_radius_m,
+                noise_m,
+                noise_lookups,
                 pad0,
                 pad1,
-                pad2,
             }
         ),
         mirror!(

@@ -606,31 +606,54 @@ fn tone_map_parity_check_rejects_a_missing_srgb_curve() {
 fn blur_difference(gpu: &Gpu, source: &str) -> f32 {
     const SIZE: usize = 32;
     let mut numbers = Numbers(3);
-    // Halves hold these eighths exactly.
-    let map: Vec<f32> = (0..SIZE * SIZE)
-        .map(|_| (64.0 * numbers.next()).floor() / 8.0)
+    // Two charts with a gap between them, in a metric that changes from texel to texel.
+    let map: Vec<Vec4> = (0..SIZE * SIZE)
+        .map(|i| {
+            let chart = match (i % SIZE).cmp(&(SIZE / 2)) {
+                std::cmp::Ordering::Less => 1.0,
+                std::cmp::Ordering::Equal => 0.0,
+                std::cmp::Ordering::Greater => 2.0,
+            };
+            let light = Vec3::new(numbers.next(), numbers.next(), numbers.next());
+            if chart == 0.0 {
+                Vec4::ZERO
+            } else {
+                light.extend(chart)
+            }
+        })
         .collect();
-    let taps = blur::taps(5.5, 0.7);
-    let target = Target::new(
-        gpu,
-        "light map",
-        [SIZE as u32; 2],
-        wgpu::TextureFormat::Rgba32Float,
-    );
-    let texels: Vec<[f32; 4]> = map.iter().map(|&light| [light; 4]).collect();
-    gpu.queue.write_texture(
-        target.texture.as_image_copy(),
-        bytemuck::cast_slice(&texels),
-        wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(16 * SIZE as u32),
-            rows_per_image: None,
-        },
-        target.texture.size(),
-    );
+    let metrics: Vec<Vec4> = (0..SIZE * SIZE)
+        .map(|i| {
+            let row = (i / SIZE) as f32 / SIZE as f32;
+            Vec4::new(20.0 + 10.0 * row, 7.0 * row, 25.0, 1.2 - 0.4 * row)
+        })
+        .collect();
+    let (taps, radius_m) = (blur::taps(0.7), 0.007);
+    let knobs = BlurUniform {
+        taps,
+        radius_m,
+        pad0: 0.0,
+        pad1: 0.0,
+        pad2: 0.0,
+    };
+    let [target, metric] = [&map, &metrics].map(|texels| {
+        let format = wgpu::TextureFormat::Rgba32Float;
+        let target = Target::new(gpu, "light map", [SIZE as u32; 2], format);
+        gpu.queue.write_texture(
+            target.texture.as_image_copy(),
+            bytemuck::cast_slice(texels),
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(16 * SIZE as u32),
+                rows_per_image: None,
+            },
+            target.texture.size(),
+        );
+        target
+    });
     let kernel = format!(
         "{source}
-        @group(0) @binding(2) var<storage, read_write> results: array<vec4f>;
+        @group(0) @binding(3) var<storage, read_write> results: array<vec4f>;
         @compute @workgroup_size(64)
         fn main(@builtin(global_invocation_id) id: vec3u) {{
             results[id.x] = blurred(vec2i(vec2u(id.x % {SIZE}u, id.x / {SIZE}u)));
@@ -644,17 +667,15 @@ fn blur_difference(gpu: &Gpu, source: &str) -> f32 {
         &kernel,
         "main",
         &[
-            Binding::Uniform(&uniform(gpu, "taps", &BlurUniform { taps })),
+            Binding::Uniform(&uniform(gpu, "taps", &knobs)),
             Binding::Unfiltered(&target.view),
+            Binding::Unfiltered(&metric.view),
             Binding::Write(&results),
         ],
     )
     .unwrap();
     dispatch(gpu, &kernel, map.len());
-    let twin: Vec<Vec4> = blur::blurred(&map, SIZE, &taps)
-        .into_iter()
-        .map(Vec4::splat)
-        .collect();
+    let twin = blur::blurred(&map, &metrics, SIZE, &taps, radius_m);
     worst(&read_buffer(gpu, &results).unwrap(), &twin, 1.0)
 }
 
@@ -666,11 +687,7 @@ fn blur_matches_the_cpu_twin() {
 
 #[test]
 fn blur_parity_check_rejects_taps_without_their_opposites() {
-    let source = sabotaged(
-        &join(LightMap::BLUR_WGSL),
-        "texel(at + offset) + texel(at - offset)",
-        "2.0 * texel(at + offset)",
-    );
+    let source = sabotaged(&join(LightMap::BLUR_WGSL), "p.rgb + q.rgb", "2.0 * p.rgb");
     assert!(blur_difference(&gpu(), &source) > 0.1);
 }
 

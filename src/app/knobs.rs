@@ -2,7 +2,9 @@
 
 use super::green_knobs as green;
 use super::panel::PanelAsk;
-use crate::scene::{Quadrature, SurfaceKind, SurfaceSection, UvMetric};
+use crate::scene::{
+    InnerLight, InnerTaps, Noise, Quadrature, SurfaceKind, SurfaceSection, UvMetric,
+};
 use egui::{ComboBox, Slider, Ui};
 
 /// Shows the knobs of the surface's own kind; returns what a change needs.
@@ -41,6 +43,8 @@ pub fn surface(ui: &mut Ui, surface: &mut SurfaceSection) -> Option<PanelAsk> {
         (
             (s.samples, s.quadrature, s.blur_passes, s.light_map_size_px),
             (s.uv_metric, s.thickness_follows_volume),
+            (s.inner.len(), s.inner_taps, s.inner_light),
+            (s.layer_shadow > 0.0, s.noise),
             green::rebuilt(s),
         )
     };
@@ -51,6 +55,23 @@ pub fn surface(ui: &mut Ui, surface: &mut SurfaceSection) -> Option<PanelAsk> {
     } else {
         None
     }
+}
+
+/// A list that one of `choices` is picked from.
+fn choice<T: Copy + PartialEq, const N: usize>(
+    ui: &mut Ui,
+    label: &str,
+    value: &mut T,
+    choices: [T; N],
+    name: impl Fn(T) -> &'static str,
+) {
+    ComboBox::from_label(label)
+        .selected_text(name(*value))
+        .show_ui(ui, |ui| {
+            for choice in choices {
+                ui.selectable_value(value, choice, name(choice));
+            }
+        });
 }
 
 fn subsurface(ui: &mut Ui, surface: &mut SurfaceSection) {
@@ -79,6 +100,24 @@ fn subsurface(ui: &mut Ui, surface: &mut SurfaceSection) {
     ui.add(Slider::new(&mut surface.color_blend, 0.0..=1.0).text("colour of the maps"));
     ui.add(Slider::new(&mut surface.multiple_scattering, 0.0..=3.0).text("multiple scattering"));
     ui.add(Slider::new(&mut surface.wrap, 0.0..=1.0).text("wrap"));
+    let noise = |noise| match noise {
+        Noise::None => "none",
+        Noise::Clouds => "clouds",
+        Noise::Gradient => "gradient",
+    };
+    choice(
+        ui,
+        "noise",
+        &mut surface.noise,
+        [Noise::None, Noise::Clouds, Noise::Gradient],
+        noise,
+    );
+    ui.add(
+        Slider::new(&mut surface.noise_m, 1e-5..=0.01)
+            .logarithmic(true)
+            .text("noise [m]"),
+    );
+    ui.add(Slider::new(&mut surface.noise_lookups, 1..=8).text("noise look-ups"));
     ui.collapsing("layers", |ui| {
         for (index, layer) in surface.layers.iter_mut().enumerate() {
             ui.label(format!("layer {}", index + 1));
@@ -110,5 +149,53 @@ fn gooey(ui: &mut Ui, surface: &mut SurfaceSection) {
             .text("blur radius [m]"),
     );
     ui.add(Slider::new(&mut surface.blur_passes, 0..=6).text("blur passes"));
+    ui.add(
+        Slider::new(&mut surface.light_map_size_px, 64..=1024)
+            .logarithmic(true)
+            .text("light map [px]"),
+    );
     ui.add(Slider::new(&mut surface.outer_opacity, 0.0..=2.0).text("outer opacity"));
+    ui.add(Slider::new(&mut surface.layer_shadow, 0.0..=1.0).text("shadow between layers"));
+    let light = |light| match light {
+        InnerLight::Map => "light map",
+        InnerLight::NormalMap => "normal map",
+        InnerLight::SmoothNormal => "smooth normal",
+    };
+    choice(
+        ui,
+        "light of inner layers",
+        &mut surface.inner_light,
+        [
+            InnerLight::Map,
+            InnerLight::NormalMap,
+            InnerLight::SmoothNormal,
+        ],
+        light,
+    );
+    let taps = |taps| match taps {
+        InnerTaps::One => "not",
+        InnerTaps::Three => "by three taps",
+        InnerTaps::Disc => "by the disc",
+    };
+    choice(
+        ui,
+        "inner layers blurred",
+        &mut surface.inner_taps,
+        [InnerTaps::One, InnerTaps::Three, InnerTaps::Disc],
+        taps,
+    );
+    ui.add(Slider::new(&mut surface.inner_blur, 0.0..=2.0).text("inner blur [of the way]"));
+    ui.collapsing("inner layers", |ui| {
+        for (index, layer) in surface.inner.iter_mut().enumerate() {
+            ui.label(format!("inner layer {}", index + 1));
+            ui.add(Slider::new(&mut layer.distance, 0.0..=8.0).text("distance [layer distances]"));
+            ui.add(Slider::new(&mut layer.opacity, 0.0..=1.0).text("opacity"));
+            ui.horizontal(|ui| {
+                for value in &mut layer.color {
+                    ui.add(egui::DragValue::new(value).range(0.0..=4.0).speed(0.01));
+                }
+                ui.label("colour");
+            });
+        }
+    });
 }

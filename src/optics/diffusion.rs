@@ -176,7 +176,7 @@ pub fn diffused(
 }
 
 /// The texel itself, or where it is empty a neighbour that is not: sides first, then corners.
-fn covered_near(at: IVec2, texel: impl Fn(IVec2) -> Vec4) -> IVec2 {
+pub(super) fn covered_near(at: IVec2, texel: impl Fn(IVec2) -> Vec4) -> IVec2 {
     const BESIDE: [[i32; 2]; 9] = [
         [0, 0],
         [1, 0],

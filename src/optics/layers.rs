@@ -28,6 +28,40 @@ pub fn inner_share(opacity: f32, cos_eye: f32) -> f32 {
     (1.0 - opacity.clamp(0.0, 1.0)) * cos_eye.clamp(0.0, 1.0)
 }
 
+/// Share of the light that a layer of `opacity` lets through to those below (Oat 2006, 4.7).
+pub fn let_through(opacity: f32, layer_shadow: f32) -> f32 {
+    1.0 - layer_shadow * opacity.clamp(0.0, 1.0)
+}
+
+/// What is seen of layers so far, from above.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen {
+    /// Radiance of what was seen.
+    pub radiance: Vec3,
+    /// Share of what lies below that is not hidden.
+    pub left: f32,
+    /// Share of the light that reaches what lies below.
+    pub lit: f32,
+}
+
+impl Seen {
+    /// Before the first layer.
+    pub const NOTHING: Self = Self {
+        radiance: Vec3::ZERO,
+        left: 1.0,
+        lit: 1.0,
+    };
+}
+
+/// What is seen once a layer of `color` and `opacity` has been added below.
+pub fn layered(before: Seen, color: Vec3, opacity: f32, layer_shadow: f32) -> Seen {
+    Seen {
+        radiance: before.radiance + before.left * before.lit * opacity * color,
+        left: before.left * (1.0 - opacity),
+        lit: before.lit * let_through(opacity, layer_shadow),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -60,6 +94,25 @@ mod tests {
         assert_eq!(inner_share(1.0, 1.0), 0.0);
         assert_eq!(inner_share(0.0, 1.0), 1.0);
         assert_eq!(inner_share(0.0, -0.2), 0.0);
+    }
+
+    #[test]
+    fn layers_of_one_color_look_as_one_and_shadows_darken_the_deeper_ones() {
+        let seen = |opacities: &[f32], shadow| {
+            opacities.iter().fold(Seen::NOTHING, |seen, &a| {
+                layered(seen, Vec3::ONE, a, shadow)
+            })
+        };
+        for opacities in [&[1.0][..], &[0.3, 1.0], &[0.2, 0.7, 0.1, 1.0]] {
+            let all = seen(opacities, 0.0);
+            assert!(
+                (all.radiance.x - 1.0).abs() < 1e-6 && all.left == 0.0,
+                "{all:?}"
+            );
+        }
+        // 0.3 of the light is seen on the first; of what is left, 0.7, the second has 1 - 0.5 * 0.3.
+        let shaded = seen(&[0.3, 1.0], 0.5).radiance.x;
+        assert!((shaded - (0.3 + 0.7 * 0.85)).abs() < 1e-6, "{shaded}");
     }
 
     proptest! {

@@ -13,6 +13,7 @@ pub mod light_plane;
 pub mod light_quadric;
 pub mod march;
 pub mod medium;
+pub mod noise;
 pub mod pack;
 pub mod stack;
 pub mod tone;

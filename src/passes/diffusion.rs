@@ -80,6 +80,7 @@ impl Diffusion {
         "light.wgsl",
         "green.wgsl",
         "behind_none.wgsl",
+        "metric.wgsl",
         "diffusion_map.wgsl"
     ];
     /// The same for one that does.
@@ -90,10 +91,11 @@ impl Diffusion {
         "green.wgsl",
         "body_light.wgsl",
         "behind_depths.wgsl",
+        "metric.wgsl",
         "diffusion_map.wgsl"
     ];
     /// The WGSL files of a blur.
-    pub const BLUR_WGSL: &'static [Wgsl] = crate::wgsl!["diffuse.wgsl"];
+    pub const BLUR_WGSL: &'static [Wgsl] = crate::wgsl!["chart.wgsl", "diffuse.wgsl"];
 
     /// Gaussians that are blurred in the map: the narrowest is lit at the pixel unless the scene says otherwise.
     pub fn blurred_gaussians(section: &SurfaceSection) -> std::ops::Range<usize> {
@@ -258,21 +260,30 @@ pub fn uniforms(section: &SurfaceSection, texels_per_m: f32) -> [DiffuseUniform;
     })
 }
 
+/// Number of each vertex's chart, from 1, and its metric at rest.
+///
+/// # Errors
+///
+/// [`GpuError`] if the adapter has no room for them.
+pub fn charts_at_rest(gpu: &Gpu, mesh: &SurfaceMesh) -> Result<wgpu::Buffer, GpuError> {
+    let rest: Vec<[f32; 4]> = charts(mesh)
+        .iter()
+        .zip(rest_gradients(mesh))
+        .map(|(chart, [ut, ub, vt, vb])| {
+            let here = metric(Vec3::new(ut, ub, 0.0), Vec3::new(vt, vb, 0.0));
+            [(chart % CHARTS_MAX + 1) as f32, here.x, here.y, here.z]
+        })
+        .collect();
+    storage(gpu, "charts and metric at rest", &rest)
+}
+
 fn light_draw(
     gpu: &Gpu,
     section: &SurfaceSection,
     surface_mesh: &SurfaceMesh,
     inputs: &DiffusionInputs<'_>,
 ) -> Result<Draw, GpuError> {
-    let rest: Vec<[f32; 4]> = charts(surface_mesh)
-        .iter()
-        .zip(rest_gradients(surface_mesh))
-        .map(|(chart, [ut, ub, vt, vb])| {
-            let here = metric(Vec3::new(ut, ub, 0.0), Vec3::new(vt, vb, 0.0));
-            [(chart % CHARTS_MAX + 1) as f32, here.x, here.y, here.z]
-        })
-        .collect();
-    let rest = storage(gpu, "charts and metric at rest", &rest)?;
+    let rest = charts_at_rest(gpu, surface_mesh)?;
     let translucent = inputs.green.depths().is_some();
     let parts = if translucent {
         Diffusion::TRANSLUCENT_WGSL

@@ -8,7 +8,7 @@ use super::exit::Exit;
 use super::geometry::{Geometry, GeometryTargets};
 use super::green::Green;
 use super::light_path::{LightPath, LightPathKnobs, RefitCounts, patch_share};
-use super::lightmap::{LightMap, uv_per_m};
+use super::lightmap::{LightMap, LightMapInputs, uv_per_m};
 use super::maps::Maps;
 use super::mesh_buffers::MeshBuffers;
 use super::plane_carried::PlaneCarried;
@@ -50,6 +50,7 @@ impl FramePlan {
         let shadow = scene.lights.iter().any(|light| light.shadow);
         let by_depth = method == Some(LightPathMethod::DepthMap);
         let gooey = kind == SurfaceKind::Gooey;
+        let light_map = scene.surface.has_light_map();
         let blurs = scene.surface.blur_passes;
         let translucent = scene.surface.is_translucent();
         let body_depths =
@@ -83,8 +84,8 @@ impl FramePlan {
             (Exit::NAME, 1, by_depth),
             (BodyDepths::NAME, body_depths, translucent),
             (Shadow::NAME, 1, shadow && !by_depth && !translucent),
-            (LightMap::NAME, 1, gooey),
-            (LightMap::BLUR_NAME, blurs, gooey && blurs > 0),
+            (LightMap::NAME, 1, light_map),
+            (LightMap::BLUR_NAME, blurs, light_map && blurs > 0),
             (Diffusion::NAME, 1, diffusion),
             (Diffusion::BLUR_NAME, diffuse, diffusion),
             (Geometry::NAME, 1, true),
@@ -293,7 +294,7 @@ impl FramePasses {
             None
         };
         let constants = light_constants(&lights);
-        let maps = Maps::new(gpu, tissue);
+        let maps = Maps::new(gpu, tissue, scene.surface.noise);
         let no_shadow = Target::new(gpu, "no shadow", [1; 2], DEPTH_FORMAT);
         let shadow_map = shadow_map(
             shadow.as_ref(),
@@ -319,16 +320,20 @@ impl FramePasses {
             )?),
             _ => None,
         };
-        let light_map = if scene.surface.kind == SurfaceKind::Gooey {
+        let light_map = if scene.surface.has_light_map() {
             Some(LightMap::new(
                 gpu,
-                scene.surface.light_map_size_px,
-                scene.surface.blur_passes,
-                &frame,
-                &constants,
-                &mesh,
-                &tangents,
-                &shadow_map.view,
+                &scene.surface,
+                surface_mesh,
+                &LightMapInputs {
+                    frame: &frame,
+                    light_constants: &constants,
+                    mesh: &mesh,
+                    tangents: &tangents,
+                    maps: &maps,
+                    map_size_px: tissue.size_px,
+                    shadow_map: &shadow_map.view,
+                },
             )?)
         } else {
             None
@@ -461,6 +466,11 @@ impl FramePasses {
         }
     }
 
+    /// The light map of the surface `gooey`.
+    pub fn light_map(&self) -> Option<&LightMap> {
+        self.light_map.as_ref()
+    }
+
     /// The light map of the surface `diffusion`.
     pub fn diffusion(&self) -> Option<&Diffusion> {
         self.diffusion.as_ref()
@@ -510,8 +520,7 @@ impl FramePasses {
         }
         // Irradiance in texture space, blurred; only the gooey surface reads it.
         if let Some(light_map) = &self.light_map {
-            let radius = self.knobs.blur_radius_m * self.uv_per_m;
-            light_map.record(gpu, radius, &self.mesh, encoder, timer);
+            light_map.record(gpu, self.knobs.blur_radius_m, &self.mesh, encoder, timer);
         }
         // Where light that comes through the body enters and leaves it.
         if let Some(green) = &self.green {

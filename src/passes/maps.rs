@@ -2,7 +2,9 @@
 
 use crate::geom::paint::TissueMaps;
 use crate::gpu::Gpu;
+use crate::optics::noise;
 use crate::optics::tone::linear_from_srgb;
+use crate::scene::Noise;
 use half::f16;
 use image::{DynamicImage, RgbaImage};
 
@@ -20,13 +22,15 @@ pub struct Maps {
     /// Lower boundaries of layers 1 to 4, as shares of the deepest, and of layers 5 to 8; of two views the second is
     /// the first where there are no more than four.
     pub layers: [wgpu::TextureView; LAYER_MAPS_MAX],
+    /// Clouds that move the march, where a scene asks for them.
+    pub noise: Option<wgpu::TextureView>,
     /// Linear, with mipmaps.
     pub sampler: wgpu::Sampler,
 }
 
 impl Maps {
-    /// Uploads `maps`.
-    pub fn new(gpu: &Gpu, maps: &TissueMaps) -> Self {
+    /// Uploads `maps`, and the clouds if `noise` is made of them.
+    pub fn new(gpu: &Gpu, maps: &TissueMaps, noise: Noise) -> Self {
         Self {
             outer: upload(gpu, "outer map", square_roots(&maps.outer)),
             normal: upload(gpu, "normal map", maps.normal.clone()),
@@ -34,6 +38,15 @@ impl Maps {
             layers: std::array::from_fn(|k| {
                 let last = maps.layers.len() - 1;
                 upload_depths(gpu, &maps.layers[k.min(last)])
+            }),
+            noise: (noise == Noise::Clouds).then(|| {
+                let side = noise::SIZE as u32;
+                let clouds = noise::clouds();
+                let picture = RgbaImage::from_fn(side, side, |x, y| {
+                    let [r, g] = clouds[(y * side + x) as usize];
+                    image::Rgba([r, g, 0, 255])
+                });
+                upload(gpu, "noise", picture)
             }),
             sampler: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("maps"),

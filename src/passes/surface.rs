@@ -8,7 +8,7 @@ use super::light_path::CoverKind;
 use super::maps::Maps;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join};
 use crate::optics::LAYERS;
-use crate::scene::{Quadrature, SurfaceKind, SurfaceSection};
+use crate::scene::{InnerLight, InnerTaps, Noise, Quadrature, SurfaceKind, SurfaceSection};
 
 /// What a surface reads, made by other passes.
 pub struct SurfaceInputs<'a> {
@@ -62,6 +62,7 @@ impl Surface {
                     "medium.wgsl",
                     "layers_four.wgsl",
                     "light_plane.wgsl",
+                    "noise.wgsl",
                     "subsurface.wgsl"
                 ],
                 CoverKind::DepthMaps => crate::wgsl![
@@ -74,6 +75,7 @@ impl Surface {
                     "layers_four.wgsl",
                     "light_entry.wgsl",
                     "light_depth.wgsl",
+                    "noise.wgsl",
                     "subsurface.wgsl"
                 ],
                 CoverKind::Quadrics => crate::wgsl![
@@ -85,6 +87,7 @@ impl Surface {
                     "medium.wgsl",
                     "layers_four.wgsl",
                     "light_quadric.wgsl",
+                    "noise.wgsl",
                     "subsurface.wgsl"
                 ],
             },
@@ -95,6 +98,7 @@ impl Surface {
                 "light.wgsl",
                 "pixel.wgsl",
                 "layers.wgsl",
+                "disc.wgsl",
                 "gooey.wgsl"
             ],
             SurfaceKind::Wrap => crate::wgsl![
@@ -183,6 +187,11 @@ impl Surface {
                 Quadrature::ClosedForm => 1.0,
                 Quadrature::Published => 2.0,
             };
+            let noise = match section.noise {
+                Noise::None => 0.0,
+                Noise::Clouds => 1.0,
+                Noise::Gradient => 2.0,
+            };
             constants.extend([
                 ("QUADRATURE", quadrature),
                 ("SAMPLES", f64::from(section.samples)),
@@ -191,10 +200,14 @@ impl Surface {
                     f64::from(section.samples.div_ceil(section.layers.len() as u32)),
                 ),
                 ("LAYER_COUNT", section.layers.len() as f64),
+                ("NOISE", noise),
             ]);
             if inputs.cover == CoverKind::Planes && section.quadrature == Quadrature::Published {
                 constants.push(("MIRRORED", 1.0));
             }
+        }
+        if section.kind == SurfaceKind::Gooey {
+            constants.extend(gooey_constants(section));
         }
         if section.kind == SurfaceKind::Absorption {
             constants.extend(Green::constants(section));
@@ -251,6 +264,27 @@ impl Surface {
     }
 }
 
+/// Values of the `override`s of `shaders/gooey.wgsl`.
+fn gooey_constants(section: &SurfaceSection) -> [(&'static str, f64); 4] {
+    let taps = match section.inner_taps {
+        InnerTaps::One => 0.0,
+        InnerTaps::Three => 1.0,
+        InnerTaps::Disc => 2.0,
+    };
+    let light = match section.inner_light {
+        InnerLight::Map => 0.0,
+        InnerLight::NormalMap => 1.0,
+        InnerLight::SmoothNormal => 2.0,
+    };
+    let shades = f64::from(u8::from(section.layer_shadow > 0.0));
+    [
+        ("INNER_COUNT", section.inner.len() as f64),
+        ("INNER_BLUR", taps),
+        ("INNER_LIGHT", light),
+        ("SHADES", shades),
+    ]
+}
+
 /// The bindings of `shaders/pixel.wgsl`, in its order, and of `shaders/light_depth.wgsl` or `shaders/green.wgsl`.
 fn bindings<'a>(inputs: &SurfaceInputs<'a>) -> Vec<Binding<'a>> {
     let mut bindings = vec![
@@ -280,6 +314,7 @@ fn bindings<'a>(inputs: &SurfaceInputs<'a>) -> Vec<Binding<'a>> {
         Binding::Integers(normals),
         Binding::Depth(exits),
         Binding::Texture(&inputs.maps.layers[1]),
+        Binding::Texture(inputs.maps.noise.as_ref().unwrap_or(&inputs.maps.outer)),
     ]);
     bindings
 }

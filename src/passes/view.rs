@@ -1,7 +1,9 @@
 //! What the shaders know of a frame: camera, lights, layers and knobs, as one uniform.
 
 use crate::optics::LAYERS_MAX;
-use crate::scene::{LIGHTS_MAX, PlacedLight, RestBox, Scene, SurfaceSection};
+use crate::scene::{
+    INNER_MAX, InnerSection, LIGHTS_MAX, PlacedLight, RestBox, Scene, SurfaceSection,
+};
 use glam::{Mat4, Vec3};
 
 /// The march ends where the clearest layer has left exp(-8) of the light.
@@ -119,6 +121,8 @@ pub struct FrameUniform {
     pub albedo: [[f32; 4]; LAYERS_MAX],
     pub through: [f32; 4],
     pub size: [f32; 4],
+    pub inner: [[f32; 4]; INNER_MAX],
+    pub inner_distances: [f32; INNER_MAX],
     pub layer_depth_max_m: f32,
     pub reach_m: f32,
     pub color_blend: f32,
@@ -132,9 +136,13 @@ pub struct FrameUniform {
     pub shadow_depth_m: f32,
     pub shadow_bias_m: f32,
     pub map_level: f32,
+    pub inner_blur: f32,
+    pub layer_shadow: f32,
+    pub blur_radius_m: f32,
+    pub noise_m: f32,
+    pub noise_lookups: u32,
     pub pad0: f32,
     pub pad1: f32,
-    pub pad2: f32,
 }
 
 /// The lights of a scene, the one that casts shadows first.
@@ -197,6 +205,9 @@ impl FrameUniform {
             .iter()
             .map(|layer| layer.extinction_per_m().min_element())
             .fold(f32::INFINITY, f32::min);
+        let last = surface.inner.len().max(1) - 1;
+        let inner: [InnerSection; INNER_MAX] =
+            std::array::from_fn(|k| surface.inner.get(k.min(last)).copied().unwrap_or_default());
         let [width, height] = size.map(|side| side as f32);
         let clip_from_world = view.clip_from_world(width / height);
         // Rows of the matrix: clip units a metre across and along the light.
@@ -213,6 +224,11 @@ impl FrameUniform {
             albedo: layers.map(|layer| layer.albedo().extend(0.0).to_array()),
             through: deepest.diffuse_attenuation_per_m().extend(0.0).to_array(),
             size: [width, height, 1.0 / width, 1.0 / height],
+            inner: inner.map(|layer| {
+                let [r, g, b] = layer.color;
+                [r, g, b, layer.opacity]
+            }),
+            inner_distances: inner.map(|layer| layer.distance),
             layer_depth_max_m: surface.layer_depth_max_m,
             reach_m: OPTICAL_DEPTH_MAX / clearest,
             color_blend: surface.color_blend,
@@ -227,9 +243,13 @@ impl FrameUniform {
             // Two texels: what a slope of 60 degrees rises over one.
             shadow_bias_m: 2.0 * 2.0 / (across * super::shadow::SIZE_PX as f32),
             map_level: map_level(view, size[1], map_px_per_m),
+            inner_blur: surface.inner_blur,
+            layer_shadow: surface.layer_shadow,
+            blur_radius_m: surface.blur_radius_m,
+            noise_m: surface.noise_m,
+            noise_lookups: surface.noise_lookups,
             pad0: 0.0,
             pad1: 0.0,
-            pad2: 0.0,
         }
     }
 }

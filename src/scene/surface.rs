@@ -1,6 +1,7 @@
 //! `[surface]`: the one surface model of a scene, its layers and its knobs.
 
 use super::check::Checker;
+use super::gooey::{INNER_MAX, InnerLight, InnerSection, InnerTaps, Noise};
 use super::green::{AbsorptionSection, DiffusionSection, LookupSection};
 use crate::optics::{LAYERS_MAX, Layer};
 use glam::Vec3;
@@ -28,9 +29,25 @@ pub struct SurfaceSection {
     pub multiple_scattering: f32,
     /// How far that diffuse light reaches round the terminator, 0 to 1.
     pub wrap: f32,
-    /// `gooey`: distance between the two layers [m].
+    /// `subsurface`: what moves the places where the march reads the layers, against bands (Norberg 2010, 3.1.2).
+    pub noise: Noise,
+    /// `subsurface`: how far it moves them along the surface [m], 0 to 0.1.
+    pub noise_m: f32,
+    /// `subsurface`: look-ups of `clouds`, each at the place that the one before tells, 1 to 8.
+    pub noise_lookups: u32,
+    /// `gooey`: distance between the outer layer and the first inner one [m]; inner layers say theirs as multiples of it.
     pub layer_distance_m: f32,
-    /// `gooey`: radius of the light map's blur [m].
+    /// `gooey`: one to four inner layers, outermost first; the last one is opaque.
+    pub inner: Vec<InnerSection>,
+    /// `gooey`: how the colour of inner layers is blurred.
+    pub inner_taps: InnerTaps,
+    /// `gooey`: radius of that blur, as a share of the way from the surface to the layer, 0 to 4.
+    pub inner_blur: f32,
+    /// `gooey`: what lights the inner layers.
+    pub inner_light: InnerLight,
+    /// `gooey`: share of the light that an opaque layer keeps from those below it, 0 to 1.
+    pub layer_shadow: f32,
+    /// `gooey`: radius of the disc that the light of inner layers is blurred by [m].
     pub blur_radius_m: f32,
     /// `gooey`: times that it is blurred.
     pub blur_passes: u32,
@@ -175,7 +192,15 @@ impl Default for SurfaceSection {
             color_blend: 0.7,
             multiple_scattering: 1.0,
             wrap: 0.35,
+            noise: Noise::default(),
+            noise_m: 0.001,
+            noise_lookups: 3,
             layer_distance_m: 0.0015,
+            inner: vec![InnerSection::default()],
+            inner_taps: InnerTaps::default(),
+            inner_blur: 0.5,
+            inner_light: InnerLight::default(),
+            layer_shadow: 0.0,
             blur_radius_m: 0.004,
             blur_passes: 2,
             outer_opacity: 1.0,
@@ -201,6 +226,11 @@ impl SurfaceSection {
             SurfaceKind::Diffusion => self.diffusion.translucency > 0.0,
             _ => false,
         }
+    }
+
+    /// Whether a light map is drawn for inner layers.
+    pub fn has_light_map(&self) -> bool {
+        self.kind == SurfaceKind::Gooey && self.inner_light == InnerLight::Map
     }
 
     /// Extinction σ_t [1/m] that bounds how far light wanders: of the densest layer, in the colour that
@@ -255,6 +285,9 @@ impl SurfaceSection {
             ("multiple_scattering", self.multiple_scattering, 10.0),
             ("wrap", self.wrap, 1.0),
             ("layer_distance_m", self.layer_distance_m, 1.0),
+            ("inner_blur", self.inner_blur, 4.0),
+            ("layer_shadow", self.layer_shadow, 1.0),
+            ("noise_m", self.noise_m, 0.1),
             ("blur_radius_m", self.blur_radius_m, 1.0),
             ("blur_passes", self.blur_passes as f32, 8.0),
             ("outer_opacity", self.outer_opacity, 4.0),
@@ -263,6 +296,22 @@ impl SurfaceSection {
             ("exposure", self.exposure, 100.0),
         ] {
             c.range(&format!("surface.{name}"), value, 0.0, high);
+        }
+        c.range("surface.noise_lookups", self.noise_lookups as f32, 1.0, 8.0);
+        if !(1..=INNER_MAX).contains(&self.inner.len()) {
+            c.problem(
+                "surface.inner",
+                &format!(
+                    "there are {}; 1 to {INNER_MAX} are allowed",
+                    self.inner.len()
+                ),
+            );
+        }
+        for (index, layer) in self.inner.iter().enumerate() {
+            let key = |name: &str| format!("surface.inner.{index}.{name}");
+            c.range(&key("distance"), layer.distance, 0.0, 100.0);
+            c.range(&key("opacity"), layer.opacity, 0.0, 1.0);
+            c.range3(&key("color"), layer.color, 0.0, 4.0);
         }
         if self.thickness_follows_volume && self.uv_metric == UvMetric::Unit {
             c.problem(

@@ -10,7 +10,7 @@ use super::sweep::{Cost, Row, State, Sweep, Verdict, finite};
 use crate::app::{AppError, load_scene};
 use crate::geom::SurfaceMesh;
 use crate::geom::paint::TissueMaps;
-use crate::gpu::{Gpu, Timer, read_texture_words};
+use crate::gpu::{Gpu, Timer, read_texture_rgba16f, read_texture_words};
 use crate::measure::chart::{number, three_digits};
 use crate::measure::page::{Block, Table};
 use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
@@ -18,7 +18,6 @@ use crate::measure::stats::Stats;
 use crate::optics::pack::from_octahedral;
 use crate::passes::frame::FramePasses;
 use crate::passes::geometry::Geometry;
-use crate::passes::lightmap::uv_per_m;
 use crate::passes::view::View;
 use crate::scene::{RestBox, Scene, SurfaceKind, UvMetric};
 use glam::{Vec2, Vec3};
@@ -152,14 +151,10 @@ impl Sweep for Stretch {
         // Texture coordinates a metre of the pulled sheet.
         let exact = Vec2::new(1.0 / (along * SIDE_M), 1.0 / (across * SIDE_M));
         let off = |got: f32, exact: f32| finite(f64::from(got / exact) - 1.0);
-        // The blur is of one radius in texture space, over what a metre is there at rest.
-        let blur = uv_per_m(&self.sheet) / exact.x;
         let measures = Measures {
             depth_error_rel: off(read.u_per_m.x, exact.x),
             depth_across_error_rel: off(read.v_per_m.y, exact.y),
-            blur_error_rel: (cell.kind == SurfaceKind::Gooey)
-                .then(|| off(blur, 1.0))
-                .flatten(),
+            blur_error_rel: (read.blur_u_per_m).and_then(|blur| off(blur, exact.x)),
             thickness_error_rel: off(read.thickness * along * across, 1.0),
             oracle: "geometry of the pulled sheet".to_owned(),
         };
@@ -185,6 +180,8 @@ struct Read {
     u_per_m: Vec2,
     v_per_m: Vec2,
     thickness: f32,
+    /// What the light map's blur takes for the first.
+    blur_u_per_m: Option<f32>,
 }
 
 impl Stretch {
@@ -228,10 +225,13 @@ impl Stretch {
         let at = (PICTURE_PX * PICTURE_PX / 2 + PICTURE_PX / 2) as usize;
         let base = read_texture_words(gpu, &passes.targets.base.texture)?[at];
         let detail = read_texture_words(gpu, &passes.targets.detail.texture)?[at];
-        Ok((
-            decoded(base, detail),
-            Stats::of(times).map(|s| (s.p50, s.p95)),
-        ))
+        let mut read = decoded(base, detail);
+        if let Some(light_map) = passes.light_map() {
+            let metric = &light_map.metric().texture;
+            let middle = (metric.width() * (metric.height() / 2) + metric.width() / 2) as usize;
+            read.blur_u_per_m = Some(read_texture_rgba16f(gpu, metric)?[4 * middle]);
+        }
+        Ok((read, Stats::of(times).map(|s| (s.p50, s.p95))))
     }
 }
 
@@ -252,6 +252,7 @@ fn decoded(base: [u32; 4], detail: [u32; 4]) -> Read {
         u_per_m: in_world(halves(detail[2])),
         v_per_m: in_world(halves(detail[3])),
         thickness: halves(detail[1]).y,
+        blur_u_per_m: None,
     }
 }
 
@@ -412,6 +413,16 @@ mod tests {
             stretch,
         };
         study.measure(&cell).expect("it is drawn")
+    }
+
+    #[test]
+    fn the_blur_keeps_its_radius_with_the_metric_and_grows_with_the_stretch_without() {
+        let blur = |metric| row(metric, false, 1.5).measures.blur_error_rel.unwrap();
+        // Half floats: a thousandth.
+        let deformed = blur(UvMetric::Deformed);
+        assert!(deformed.abs() < 2e-3, "{deformed}");
+        let unit = blur(UvMetric::Unit);
+        assert!((unit - 0.5).abs() < 2e-3, "{unit}");
     }
 
     #[test]
