@@ -7,6 +7,9 @@
 #[path = "support/surfaces.rs"]
 mod surfaces;
 
+#[path = "support/shader.rs"]
+mod shader;
+
 use glam::{Mat4, Vec3, Vec4};
 use palpate::geom::SurfaceMesh;
 use palpate::geom::ray::first_hit;
@@ -20,10 +23,7 @@ use palpate::passes::shadow::SIZE_PX;
 use palpate::passes::tangents::Tangents;
 use palpate::passes::view::{FrameUniform, View};
 use palpate::scene::{PlacedLight, SurfaceSection};
-
-fn gpu() -> Gpu {
-    Gpu::headless().expect("a GPU adapter; a software one (mesa-vulkan-drivers) will do")
-}
+use shader::gpu;
 
 /// Two far lights and a near one.
 fn lights() -> Vec<PlacedLight> {

@@ -7,6 +7,9 @@
 #[path = "support/surfaces.rs"]
 mod surfaces;
 
+#[path = "support/shader.rs"]
+mod shader;
+
 use glam::{Vec2, Vec3, Vec4};
 use palpate::geom::SurfaceMesh;
 use palpate::geom::paint::TissueMaps;
@@ -27,16 +30,7 @@ use palpate::passes::tangents::Tangents;
 use palpate::passes::view::{View, shadow_from_world};
 use palpate::scene::{RestBox, Scene, SceneSource, SurfaceSection};
 use palpate::wgsl;
-
-fn gpu() -> Gpu {
-    Gpu::headless().expect("a GPU adapter; a software one (mesa-vulkan-drivers) will do")
-}
-
-fn sabotaged(source: &str, from: &str, to: &str) -> String {
-    let changed = source.replace(from, to);
-    assert_ne!(changed, source, "the sabotage must change the shader");
-    changed
-}
+use shader::{gpu, sabotaged};
 
 // Wrapped light.
 

@@ -7,6 +7,9 @@
 #[path = "support/surfaces.rs"]
 mod surfaces;
 
+#[path = "support/shader.rs"]
+mod shader;
+
 use glam::{Vec2, Vec3, Vec4};
 use image::{Rgba, RgbaImage};
 use palpate::geom::SurfaceMesh;
@@ -21,16 +24,7 @@ use palpate::passes::frame::FramePasses;
 use palpate::passes::view::View;
 use palpate::scene::{RestBox, Scene, SceneSource};
 use palpate::wgsl;
-
-fn gpu() -> Gpu {
-    Gpu::headless().expect("a GPU adapter; a software one (mesa-vulkan-drivers) will do")
-}
-
-fn sabotaged(source: &str, from: &str, to: &str) -> String {
-    let changed = source.replace(from, to);
-    assert_ne!(changed, source, "the sabotage must change the shader");
-    changed
-}
+use shader::{gpu, sabotaged};
 
 /// What `body` makes of each of `cases`; `clouds` stand at binding 2.
 fn call(gpu: &Gpu, source: &str, body: &str, cases: &[Vec4], clouds: &Target) -> Vec<Vec4> {

@@ -3,6 +3,9 @@
 //! Functions of files without bindings are called over lists of cases by a few lines of compute shader; the march
 //! is called as the surface calls it. Differences are relative, over the range that a scene may ask for.
 
+#[path = "support/shader.rs"]
+mod shader;
+
 use glam::{Vec3, Vec4};
 use palpate::geom::SurfaceMesh;
 use palpate::geom::plane::LightPathMethod;
@@ -22,6 +25,7 @@ use palpate::passes::surface::Surface;
 use palpate::passes::view::{FrameUniform, View};
 use palpate::scene::{PlacedLight, RestBox, Scene, SceneSource, SurfaceKind, SurfaceSection};
 use palpate::wgsl;
+use shader::{gpu, sabotaged};
 
 #[allow(dead_code)] // Other tests use the rest.
 #[path = "support/surfaces.rs"]
@@ -30,16 +34,6 @@ mod surfaces;
 /// Worst relative difference seen on llvmpipe is 4e-6, of the highlight; the rest is room for fused
 /// multiply-add and a coarser exp.
 const TOLERANCE: f32 = 1e-4;
-
-fn gpu() -> Gpu {
-    Gpu::headless().expect("a GPU adapter; a software one (mesa-vulkan-drivers) will do")
-}
-
-fn sabotaged(source: &str, from: &str, to: &str) -> String {
-    let changed = source.replace(from, to);
-    assert_ne!(changed, source, "the sabotage must change the shader");
-    changed
-}
 
 /// What `body`, WGSL that turns `cases[4 i ..]` into a `vec4f`, makes of four vectors a case.
 fn call(gpu: &Gpu, source: &str, body: &str, cases: &[[Vec4; 4]]) -> Vec<Vec4> {

@@ -3,6 +3,9 @@
 //!
 //! A missing adapter is a failure, not a skip: a software one (mesa-vulkan-drivers) will do.
 
+#[path = "support/shader.rs"]
+mod shader;
+
 use glam::{Vec2, Vec3, Vec4};
 use half::f16;
 use palpate::geom::SurfaceMesh;
@@ -11,6 +14,7 @@ use palpate::gpu::{Gpu, Timer, read_texture_rgba16f, read_texture_words};
 use palpate::passes::frame::FramePasses;
 use palpate::passes::view::View;
 use palpate::scene::{RestBox, Scene, SceneSource};
+use shader::gpu;
 
 /// A level sheet of 0.1 m, seen from above, whose texture is as large.
 fn sheet(side: usize) -> SurfaceMesh {
@@ -202,8 +206,4 @@ fn unit_frames_and_a_thickness_from_the_metric_exclude_each_other() {
     for name in ["sampled", "quadric", "depth-map"] {
         assert!(method.contains(name), "{method}");
     }
-}
-
-fn gpu() -> Gpu {
-    Gpu::headless().expect("a GPU adapter; a software one (mesa-vulkan-drivers) will do")
 }

@@ -1,6 +1,11 @@
 //! A surface on the GPU with its normals and tangents, what the twins need to know of it, and how differences between
 //! both are summed up.
 
+#[path = "shader.rs"]
+mod shader;
+
+pub use shader::{gpu, sabotaged};
+
 use super::surfaces::{sphere, wavy};
 use glam::{Vec3, Vec4};
 use palpate::geom::SurfaceMesh;
@@ -14,11 +19,6 @@ use palpate::passes::tangents::Tangents;
 
 /// Reach of a patch on the test surfaces [m]: 2 to 60 members, by the surface's fineness.
 pub const RADIUS_M: f32 = 0.012;
-
-/// The adapter; that there is none is a failure.
-pub fn gpu() -> Gpu {
-    Gpu::headless().expect("a GPU adapter; a software one (mesa-vulkan-drivers) will do")
-}
 
 /// Waves of so many points a side, and one surface with a seam and poles.
 pub fn surfaces(sides: &[usize]) -> Vec<(String, SurfaceMesh)> {
@@ -118,11 +118,4 @@ pub fn worst(differences: impl Iterator<Item = f32>) -> f32 {
             d
         }
     })
-}
-
-/// `source` with something changed.
-pub fn sabotaged(source: &str, from: &str, to: &str) -> String {
-    let changed = source.replace(from, to);
-    assert_ne!(changed, source, "the sabotage must change the kernel");
-    changed
 }
