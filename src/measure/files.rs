@@ -111,6 +111,9 @@ pub fn write(file: &Path, bytes: &[u8]) -> Result<(), FileError> {
 
 /// Lets `fill` write the content of `file`, which appears under its name only when complete.
 ///
+/// A link stays and what it points to is written. A pipe or a device (`/dev/null`, `/dev/stdout`)
+/// takes the bytes as they come: nothing may be moved into its place.
+///
 /// # Errors
 ///
 /// [`FileError::Write`] if the system or `fill` fails; what was in `file` before is then still
@@ -119,6 +122,32 @@ pub fn write_with(
     file: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), FileError> {
+    let written = match std::fs::metadata(file) {
+        Ok(there) if !there.is_file() && !there.is_dir() => stream_into(file, fill),
+        Ok(_) => std::fs::canonicalize(file).and_then(|place| replace(&place, fill)),
+        Err(_) => replace(file, fill),
+    };
+    written.map_err(|source| FileError::Write {
+        file: file.to_owned(),
+        source,
+    })
+}
+
+/// Fills a pipe or a device that is there.
+fn stream_into(
+    file: &Path,
+    fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> io::Result<()> {
+    let mut out = BufWriter::new(File::options().write(true).open(file)?);
+    fill(&mut out)?;
+    out.flush()
+}
+
+/// Fills a new file beside `file` and moves it there when it is whole.
+fn replace(
+    file: &Path,
+    fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> io::Result<()> {
     let mut name = file.file_name().unwrap_or_default().to_owned();
     name.push(format!(".{}.partial", std::process::id()));
     let partial = file.with_file_name(name);
@@ -128,13 +157,9 @@ pub fn write_with(
         out.into_inner()?.sync_data()?;
         std::fs::rename(&partial, file)
     });
-    filled.map_err(|source| {
+    filled.inspect_err(|_| {
         // If it cannot be removed either, the first error is the one worth telling.
         let _ = std::fs::remove_file(&partial);
-        FileError::Write {
-            file: file.to_owned(),
-            source,
-        }
     })
 }
 
@@ -239,6 +264,40 @@ pub(super) mod tests {
         assert!(error.unwrap_err().to_string().contains("frames.csv"));
         assert_eq!(read(&file).unwrap(), b"old");
         assert_eq!(folder.names(), ["frames.csv"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn pipe_takes_the_bytes_and_stays_a_pipe() {
+        use std::os::unix::fs::FileTypeExt;
+        let folder = Folder::new();
+        let pipe = folder.0.join("log");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        assert!(made.expect("mkfifo runs").success());
+        let reader = std::thread::spawn({
+            let pipe = pipe.clone();
+            move || read(&pipe).unwrap()
+        });
+        write(&pipe, b"frame,ms").unwrap();
+        assert!(
+            std::fs::metadata(&pipe).unwrap().file_type().is_fifo(),
+            "a pipe, or /dev/null, was replaced by a file"
+        );
+        assert_eq!(reader.join().unwrap(), b"frame,ms");
+        assert_eq!(folder.names(), ["log"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn link_stays_a_link_and_what_it_points_to_is_written() {
+        let folder = Folder::new();
+        let file = folder.0.join("kept.csv");
+        write(&file, b"old").unwrap();
+        let link = folder.0.join("latest.csv");
+        std::os::unix::fs::symlink("kept.csv", &link).unwrap();
+        write(&link, b"new").unwrap();
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(read(&file).unwrap(), b"new");
     }
 
     #[test]
