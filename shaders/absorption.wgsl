@@ -30,7 +30,7 @@ fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
     if LIGHT_COUNT > 3u {
         light += passed(3u, pixel).share;
     }
-    return vec4f(color_of(pixel) * light / PI + wet(pixel, open), 1.0);
+    return shown(color_of(pixel) * light / PI + wet(pixel, open), at);
 }
 
 fn passed(k: u32, pixel: Pixel) -> Passing {

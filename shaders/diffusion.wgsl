@@ -35,7 +35,7 @@ fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
         light += lambert(3u, pixel);
     }
     let sum = core * light * color + (1.0 - core) * soft;
-    return vec4f(sum / PI + wet(pixel, unshadowed), 1.0);
+    return shown(sum / PI + wet(pixel, unshadowed), at);
 }
 
 fn lambert(k: u32, pixel: Pixel) -> vec3f {

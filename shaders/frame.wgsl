@@ -53,8 +53,9 @@ struct Frame {
     noise_m: f32,
     // Look-ups of the noise, each at the place that the one before tells.
     noise_lookups: u32,
+    // What radiance is multiplied by before the tone curve.
+    exposure: f32,
     pad0: f32,
-    pad1: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -143,5 +143,5 @@ fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let opacity = clamp(pixel.outer.a * frame.outer_opacity, 0.0, 1.0);
     let n_v = max(dot(pixel.relief, pixel.to_eye), 0.0);
     let color = mix(pixel.outer.rgb * outer_light, seen.radiance, (1.0 - opacity) * n_v) / PI;
-    return vec4f(color + wet(pixel, unshadowed_after(through)), 1.0);
+    return shown(color + wet(pixel, unshadowed_after(through)), at);
 }

@@ -1,4 +1,6 @@
-// What a surface model reads at a covered pixel: the packed geometry, the texture maps, the shadow map.
+// What a surface model reads at a covered pixel: the packed geometry, the texture maps, the shadow map; and what it
+// shows there: linear radiance, or what a screen shows of it over the backdrop that is already there. A pixel with
+// empty neighbours is blended with the backdrop by how many there are: the outline loses its steps.
 //
 // The triangle covers the picture at the far end of depth and is drawn where something lies before it, so
 // that pixels without tissue cost nothing.
@@ -8,7 +10,8 @@
 // Parity:  tests/shading_parity.rs, fn packed_directions_match_the_cpu_twin
 // Threads: one a covered pixel.
 // Units:   metres.
-// Fails:   one level of the maps for the whole frame: a body seen along its length shimmers at its far end.
+// Fails:   one level of the maps for the whole frame: a body seen along its length shimmers at its far end; outlines
+//          in front of other tissue keep their steps.
 
 @group(0) @binding(1) var base_map: texture_2d<u32>;
 @group(0) @binding(2) var detail_map: texture_2d<u32>;
@@ -26,6 +29,25 @@ fn pixel_vertex(@builtin(vertex_index) corner: u32) -> @builtin(position) vec4f 
     let x = f32(corner & 1u) * 4.0 - 1.0;
     let y = f32(corner >> 1u) * 4.0 - 1.0;
     return vec4f(x, y, 1.0, 1.0);
+}
+
+// 1: the tone curve, sRGB and a soft outline; 0: linear radiance.
+override TONE: u32 = 1u;
+
+fn is_empty(at: vec2i) -> f32 {
+    return select(0.0, 1.0, textureLoad(depth_map, at, 0) >= 1.0);
+}
+
+fn shown(radiance: vec3f, place: vec4f) -> vec4f {
+    if TONE == 0u {
+        return vec4f(radiance, 1.0);
+    }
+    let at = vec2i(place.xy);
+    let low = max(at - 1, vec2i(0));
+    let high = min(at + 1, vec2i(textureDimensions(depth_map)) - 1);
+    let empty = is_empty(vec2i(low.x, at.y)) + is_empty(vec2i(high.x, at.y))
+        + is_empty(vec2i(at.x, low.y)) + is_empty(vec2i(at.x, high.y));
+    return vec4f(displayed(frame.exposure * radiance), 1.0 - 0.25 * min(empty, 3.0));
 }
 
 struct Pixel {

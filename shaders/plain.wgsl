@@ -26,7 +26,7 @@ fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
     if LIGHT_COUNT > 3u {
         light += lambert(3u, pixel);
     }
-    return vec4f(pixel.outer.rgb * light / PI + wet(pixel, unshadowed), 1.0);
+    return shown(pixel.outer.rgb * light / PI + wet(pixel, unshadowed), at);
 }
 
 fn lambert(k: u32, pixel: Pixel) -> vec3f {

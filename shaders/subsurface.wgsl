@@ -323,5 +323,5 @@ fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let wrap = frame.wrap * vec3f(1.0, 0.42, 0.30);
     let color = mix(deep, pixel.outer.rgb, pixel.outer.a);
     radiance += frame.multiple_scattering * color * diffuse(pixel.world, soft, wrap, through) / PI;
-    return vec4f(radiance, 1.0);
+    return shown(radiance, at);
 }

@@ -1,4 +1,5 @@
-// Rigid tools: spheres and capsules of polished steel, drawn over the tissue with its depth.
+// Rigid tools: spheres and capsules of polished steel, drawn over the tissue with its depth. Towards a round outline
+// (n.v)^2 falls to zero evenly with the distance from it, so its slope says how much of a pixel is covered.
 //
 //   x = tip + r n'          for the half that faces away from the axis
 //   x = tip + axis + r n'   for the other half; n' = n turned so that +z lies along the axis
@@ -11,9 +12,13 @@
 // Units:   metres; radiance in the units of the lights, W/(m2 sr).
 // Fails:   an axis shorter than 1e-6 m is a sphere.
 
+// 1: the tone curve, sRGB and a soft outline; 0: linear radiance.
+override TONE: u32 = 1u;
+
 struct View {
     clip_from_world: mat4x4f,
-    eye: vec4f,
+    // The camera [m], and the exposure.
+    eye_exposure: vec4f,
 }
 
 struct Tool {
@@ -62,9 +67,15 @@ fn room(direction: vec3f) -> vec3f {
 @fragment
 fn fragment(in: Varyings) -> @location(0) vec4f {
     let normal = normalize(in.normal);
-    let to_eye = normalize(view.eye.xyz - in.world);
+    let to_eye = normalize(view.eye_exposure.xyz - in.world);
     let cos_view = max(dot(normal, to_eye), 0.0);
     let steel = vec3f(0.62, 0.62, 0.64);
     let fresnel = steel + (1.0 - steel) * pow(1.0 - cos_view, 5.0);
-    return vec4f(fresnel * room(reflect(-to_eye, normal)), 1.0);
+    let radiance = fresnel * room(reflect(-to_eye, normal));
+    if TONE == 0u {
+        return vec4f(radiance, 1.0);
+    }
+    let squared = cos_view * cos_view;
+    let from_outline = squared / max(length(vec2f(dpdx(squared), dpdy(squared))), 1e-6);
+    return vec4f(displayed(view.eye_exposure.w * radiance), clamp(from_outline, 0.0, 1.0));
 }

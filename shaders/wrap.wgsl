@@ -30,7 +30,7 @@ fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
         light += lit_by(3u, pixel);
     }
     // A highlight of the film has no colour of its own; that of the light is nearly white.
-    return vec4f(color_of(pixel) * light.rgb / PI + frame.wetness * light.a + mirrored(pixel), 1.0);
+    return shown(color_of(pixel) * light.rgb / PI + frame.wetness * light.a + mirrored(pixel), at);
 }
 
 fn lit_by(k: u32, pixel: Pixel) -> vec4f {

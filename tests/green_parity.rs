@@ -21,6 +21,7 @@ use palpate::optics::Layer;
 use palpate::optics::diffusion::{Axis, Profile, TAPS, diffused, metric};
 use palpate::passes::body_depths::BodyDepths;
 use palpate::passes::diffusion::{shares, texels_per_m};
+use palpate::passes::draw::Output;
 use palpate::passes::draw::Target;
 use palpate::passes::frame::FramePasses;
 use palpate::passes::green::wrap_light;
@@ -180,7 +181,16 @@ fn draw(
     let scene = Scene::read(&source, &sets).expect("a sound scene");
     let (low, high) = palpate::geom::bounds(&mesh.points);
     let rest = RestBox { low, high };
-    let passes = FramePasses::new(gpu, &scene, &rest, mesh, &plain_maps(outer), SIZE).unwrap();
+    let passes = FramePasses::new(
+        gpu,
+        &scene,
+        &rest,
+        mesh,
+        &plain_maps(outer),
+        SIZE,
+        Output::Radiance,
+    )
+    .unwrap();
     let mut timer = Timer::new(gpu, 32);
     let mut encoder = gpu.encoder();
     passes.record(gpu, points, &view(), &[], &mut encoder, &mut timer);
@@ -200,7 +210,7 @@ fn view() -> View {
 
 /// Covered pixels: place on the surface, and radiance.
 fn pixels(gpu: &Gpu, drawn: &Drawn) -> Vec<(Vec3, Vec3)> {
-    let radiance = read_texture_rgba16f(gpu, &drawn.passes.radiance.texture).unwrap();
+    let radiance = read_texture_rgba16f(gpu, &drawn.passes.target.texture).unwrap();
     let depth = read_texture_depth(gpu, &drawn.passes.targets.depth.texture).unwrap();
     let [width, height] = SIZE;
     let world_from_clip = view()

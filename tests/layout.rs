@@ -20,7 +20,6 @@ use palpate::passes::sampled_fit::Fit;
 use palpate::passes::shadow::Shadow;
 use palpate::passes::surface::Surface;
 use palpate::passes::tangents::{NormalsParams, Tangents, TangentsParams};
-use palpate::passes::tonemap::ToneMap;
 use palpate::passes::tools::{Tools, ToolsView};
 use palpate::passes::view::{FrameUniform, LightUniform};
 use palpate::scene::{SurfaceKind, SurfaceSection};
@@ -83,7 +82,6 @@ fn shaders() -> Vec<(&'static str, &'static [Wgsl])> {
             Diffusion::TRANSLUCENT_WGSL,
         ),
         ("diffuse", Diffusion::BLUR_WGSL),
-        ("tone map", ToneMap::WGSL),
         ("tools", Tools::WGSL),
     ]
 }
@@ -317,8 +315,8 @@ fn mirrors() -> Vec<Mirror> {
                 blur_radius_m,
                 noise_m,
                 noise_lookups,
+                exposure,
                 pad0,
-                pad1,
             }
         ),
         mirror!(
@@ -326,7 +324,7 @@ fn mirrors() -> Vec<Mirror> {
             "View",
             ToolsView {
                 clip_from_world,
-                eye
+                eye_exposure
             }
         ),
     ]

@@ -19,6 +19,7 @@ use palpate::gpu::{
 };
 use palpate::optics::layers::{Seen, layered};
 use palpate::optics::{blur, noise};
+use palpate::passes::draw::Output;
 use palpate::passes::draw::Target;
 use palpate::passes::frame::FramePasses;
 use palpate::passes::view::View;
@@ -226,7 +227,7 @@ fn draw(
     let scene = Scene::read(&source, &sets).expect("a sound scene");
     let (low, high) = palpate::geom::bounds(&mesh.points);
     let rest = RestBox { low, high };
-    let passes = FramePasses::new(gpu, &scene, &rest, mesh, maps, SIZE).unwrap();
+    let passes = FramePasses::new(gpu, &scene, &rest, mesh, maps, SIZE, Output::Radiance).unwrap();
     let view = View {
         up: Vec3::Y,
         eye: Vec3::new(0.1, 0.0, 0.2),
@@ -252,7 +253,7 @@ fn vectors(gpu: &Gpu, target: &Target) -> Vec<Vec4> {
 fn picture(gpu: &Gpu, maps: &TissueMaps, sets: &[&str]) -> Vec<Vec4> {
     let mesh = sheet(8);
     let passes = draw(gpu, &mesh, &mesh.points, maps, sets);
-    let radiance = vectors(gpu, &passes.radiance);
+    let radiance = vectors(gpu, &passes.target);
     assert!(radiance.iter().all(|pixel| pixel.is_finite()), "{sets:?}");
     radiance
 }

@@ -17,6 +17,7 @@ use palpate::optics::light_plane::{PlanePair, way_to_light};
 use palpate::optics::light_quadric::{self, Aim, Bend};
 use palpate::optics::march::{Cover, Ray, Rule, march, printed_reach_m, reach_m};
 use palpate::optics::{Layer, blur, film, layers, medium, pack, stack, tone};
+use palpate::passes::draw::Output;
 use palpate::passes::draw::Target;
 use palpate::passes::frame::FramePasses;
 use palpate::passes::light_path::CoverKind;
@@ -1167,7 +1168,16 @@ fn ball(gpu: &Gpu, kind: &str, sets: &[&str], light: &str) -> Vec<Vec4> {
     let scene = Scene::read(&source, &sets).expect("a sound scene");
     let (low, high) = palpate::geom::bounds(&mesh.points);
     let rest = RestBox { low, high };
-    let passes = FramePasses::new(gpu, &scene, &rest, &mesh, &tissue, [64, 64]).unwrap();
+    let passes = FramePasses::new(
+        gpu,
+        &scene,
+        &rest,
+        &mesh,
+        &tissue,
+        [64, 64],
+        Output::Radiance,
+    )
+    .unwrap();
     let view = View {
         up: Vec3::Y,
         eye: Vec3::new(0.0, 0.0, 0.4),
@@ -1178,7 +1188,7 @@ fn ball(gpu: &Gpu, kind: &str, sets: &[&str], light: &str) -> Vec<Vec4> {
     let mut encoder = gpu.encoder();
     passes.record(gpu, &mesh.points, &view, &[], &mut encoder, &mut timer);
     gpu.submit_and_wait(encoder);
-    read_texture_rgba16f(gpu, &passes.radiance.texture)
+    read_texture_rgba16f(gpu, &passes.target.texture)
         .unwrap()
         .chunks_exact(4)
         .map(Vec4::from_slice)

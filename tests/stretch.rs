@@ -11,6 +11,7 @@ use half::f16;
 use palpate::geom::SurfaceMesh;
 use palpate::geom::paint::TissueMaps;
 use palpate::gpu::{Gpu, Timer, read_texture_rgba16f, read_texture_words};
+use palpate::passes::draw::Output;
 use palpate::passes::frame::FramePasses;
 use palpate::passes::view::View;
 use palpate::scene::{RestBox, Scene, SceneSource};
@@ -71,8 +72,16 @@ fn draw(gpu: &Gpu, sets: &[&str], stretch: Vec3) -> Seen {
         low: Vec3::ZERO,
         high: Vec3::new(0.1, 0.1, 0.01),
     };
-    let passes = FramePasses::new(gpu, &scene, &rest, &mesh, &tissue, [64, 64])
-        .expect("the passes are built");
+    let passes = FramePasses::new(
+        gpu,
+        &scene,
+        &rest,
+        &mesh,
+        &tissue,
+        [64, 64],
+        Output::Radiance,
+    )
+    .expect("the passes are built");
     let points: Vec<Vec3> = mesh.points.iter().map(|&p| p * stretch).collect();
     let middle = 0.05 * stretch * Vec3::new(1.0, 1.0, 0.0);
     let view = View {
@@ -86,7 +95,7 @@ fn draw(gpu: &Gpu, sets: &[&str], stretch: Vec3) -> Seen {
     passes.record(gpu, &points, &view, &[], &mut encoder, &mut timer);
     gpu.submit_and_wait(encoder);
     let detail = read_texture_words(gpu, &passes.targets.detail.texture).expect("can be read");
-    let radiance = read_texture_rgba16f(gpu, &passes.radiance.texture).expect("can be read");
+    let radiance = read_texture_rgba16f(gpu, &passes.target.texture).expect("can be read");
     let [_, y, u, _] = detail[32 * 64 + 32];
     let half = |bits: u32| f16::from_bits(bits as u16).to_f32();
     Seen {

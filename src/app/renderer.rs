@@ -7,6 +7,7 @@ use crate::geom::paint::TissueMaps;
 use crate::gpu::{
     Gpu, PassTime, Timer, read_buffer, read_texture_depth, read_texture_rgba8, read_texture_rgba16f,
 };
+use crate::passes::draw::Output;
 use crate::passes::frame::{FramePasses, effective_method, light_radius_m};
 use crate::passes::light_path::{Primitives, RefitCounts};
 use crate::passes::tools::DrawnTool;
@@ -27,6 +28,8 @@ pub struct Renderer {
     timer: Timer,
     /// Kept for a change of surface or light path: painting takes seconds.
     tissue: Arc<TissueMaps>,
+    /// How the last frame was seen, and the tools in it.
+    last: Option<(View, Vec<DrawnTool>)>,
 }
 
 /// What drawing one frame took.
@@ -71,6 +74,7 @@ impl Renderer {
             &session.mesh,
             &tissue,
             size,
+            Output::Picture,
         )?;
         if session.scene.surface.is_translucent()
             && let Some(path) = &session.scene.surface.absorption.ramp
@@ -82,6 +86,7 @@ impl Renderer {
             gpu,
             passes,
             tissue,
+            last: None,
         })
     }
 
@@ -96,12 +101,9 @@ impl Renderer {
     }
 
     /// Makes the picture another size.
-    ///
-    /// # Errors
-    ///
-    /// [`AppError::Gpu`] if the adapter refuses it.
-    pub fn resize(&mut self, size: [u32; 2]) -> Result<(), AppError> {
-        Ok(self.passes.resize(&self.gpu, size)?)
+    pub fn resize(&mut self, size: [u32; 2]) {
+        self.passes.resize(&self.gpu, size);
+        self.last = None;
     }
 
     /// Takes over changed knobs of the surface.
@@ -147,6 +149,7 @@ impl Renderer {
         );
         self.timer.resolve(&mut encoder);
         self.gpu.submit_and_wait(encoder);
+        self.last = Some((view, tools.to_vec()));
         Ok(Frame {
             passes: self.timer.read(&self.gpu)?,
             refit: self.passes.refit_counts(&self.gpu)?,
@@ -155,7 +158,7 @@ impl Renderer {
 
     /// The finished picture, for the window to show.
     pub fn picture_view(&self) -> &wgpu::TextureView {
-        &self.passes.picture.view
+        &self.passes.target.view
     }
 
     /// The finished picture.
@@ -164,18 +167,24 @@ impl Renderer {
     ///
     /// [`AppError::Gpu`] if it can't be read back.
     pub fn picture(&self) -> Result<RgbaImage, AppError> {
-        let pixels = read_texture_rgba8(&self.gpu, &self.passes.picture.texture)?;
+        let pixels = read_texture_rgba8(&self.gpu, &self.passes.target.texture)?;
         let [width, height] = self.size();
         Ok(RgbaImage::from_raw(width, height, pixels).expect("as many pixels as the target has"))
     }
 
-    /// Linear radiance before the tone map, RGB, row by row from the top.
+    /// Linear radiance before the tone curve of the frame drawn last, RGB, row by row from the top.
     ///
     /// # Errors
     ///
-    /// [`AppError::Gpu`] if it can't be read back.
+    /// [`AppError::Gpu`] if it can't be drawn or read back.
+    ///
+    /// # Panics
+    ///
+    /// If no frame was drawn since the picture got its size.
     pub fn radiance(&self) -> Result<Vec<f32>, AppError> {
-        let rgba = read_texture_rgba16f(&self.gpu, &self.passes.radiance.texture)?;
+        let (view, tools) = self.last.as_ref().expect("a frame was drawn");
+        let drawn = self.passes.radiance(&self.gpu, view, tools)?;
+        let rgba = read_texture_rgba16f(&self.gpu, &drawn.texture)?;
         Ok(rgba
             .chunks_exact(4)
             .flat_map(|pixel| &pixel[..3])

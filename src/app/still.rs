@@ -5,6 +5,7 @@ use super::AppError;
 use crate::geom::SurfaceMesh;
 use crate::geom::paint::TissueMaps;
 use crate::gpu::{Gpu, PassTime, Timer, read_texture_rgba16f};
+use crate::passes::draw::Output;
 use crate::passes::frame::FramePasses;
 use crate::passes::view::View;
 use crate::scene::{RestBox, Scene};
@@ -39,7 +40,7 @@ impl Still {
         let (low, high) = mesh.bounds();
         let rest = RestBox { low, high };
         Ok(Self {
-            passes: FramePasses::new(gpu, scene, &rest, mesh, maps, size)?,
+            passes: FramePasses::new(gpu, scene, &rest, mesh, maps, size, Output::Radiance)?,
             timer: Timer::new(gpu, TIMED_PASSES_MAX),
             gpu: gpu.clone(),
             points: mesh.points.clone(),
@@ -74,7 +75,7 @@ impl Still {
     ///
     /// [`AppError::Gpu`] if it can't be read back.
     pub fn radiance(&self) -> Result<Vec<f32>, AppError> {
-        let rgba = read_texture_rgba16f(&self.gpu, &self.passes.radiance.texture)?;
+        let rgba = read_texture_rgba16f(&self.gpu, &self.passes.target.texture)?;
         Ok(rgba
             .chunks_exact(4)
             .flat_map(|pixel| &pixel[..3])

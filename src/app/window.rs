@@ -646,7 +646,7 @@ impl Shown {
     fn fit_picture(&mut self) -> Result<(), AppError> {
         let size = [self.view_px[2], self.view_px[3]];
         if self.renderer.size() != size {
-            self.renderer.resize(size)?;
+            self.renderer.resize(size);
             self.show_new_picture();
             if !self.camera_moved {
                 self.reset_camera();

@@ -35,6 +35,35 @@ pub struct DrawKind<'a> {
     pub constants: &'a [(&'a str, f64)],
 }
 
+/// What a frame leaves in its target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Output {
+    /// What a screen shows: the tone curve, sRGB and soft outlines over the backdrop.
+    Picture,
+    /// Linear radiance; nothing where there is nothing.
+    Radiance,
+}
+
+impl Output {
+    /// Format of the target.
+    pub fn format(self) -> wgpu::TextureFormat {
+        match self {
+            Self::Picture => super::PICTURE_FORMAT,
+            Self::Radiance => super::RADIANCE_FORMAT,
+        }
+    }
+
+    /// How what is drawn meets what is there: outlines of a picture are blended with it.
+    pub fn blend(self) -> Option<wgpu::BlendState> {
+        (self == Self::Picture).then_some(wgpu::BlendState::ALPHA_BLENDING)
+    }
+
+    /// Value of the `override` TONE of shaders that draw to it.
+    pub fn tone(self) -> (&'static str, f64) {
+        ("TONE", f64::from(u8::from(self == Self::Picture)))
+    }
+}
+
 /// What a [`Draw`] does with a depth target of [`super::DEPTH_FORMAT`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DepthUse {
@@ -144,9 +173,9 @@ impl Draw {
         }
     }
 
-    /// Binds other things in place of those given to [`Draw::new`], of the same kinds.
-    pub fn rebind(&mut self, gpu: &Gpu, label: &str, bindings: &[Binding<'_>]) {
-        (_, self.bindings) = bind(gpu, label, wgpu::ShaderStages::VERTEX_FRAGMENT, bindings);
+    /// Takes `bindings` in place of those given to [`Draw::new`]: of the same kinds, from [`bound`].
+    pub fn rebind(&mut self, bindings: wgpu::BindGroup) {
+        self.bindings = bindings;
     }
 
     /// Makes `pass` use this pipeline and its bindings.
@@ -154,6 +183,11 @@ impl Draw {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.bindings, &[]);
     }
+}
+
+/// What a [`Draw`] binds.
+pub fn bound(gpu: &Gpu, label: &str, bindings: &[Binding<'_>]) -> wgpu::BindGroup {
+    bind(gpu, label, wgpu::ShaderStages::VERTEX_FRAGMENT, bindings).1
 }
 
 /// A texture that is drawn to and then read, with its view.

@@ -1,9 +1,11 @@
 //! The passes of a scene, and one frame of them in order.
 
+use super::DEPTH_FORMAT;
+use super::backdrop::backdrop;
 use super::body_depths::BodyDepths;
 use super::depth_maps::DepthMaps;
 use super::diffusion::{Diffusion, DiffusionInputs};
-use super::draw::Target;
+use super::draw::{Output, Target};
 use super::exit::Exit;
 use super::geometry::{Geometry, GeometryTargets};
 use super::green::Green;
@@ -18,10 +20,8 @@ use super::sampled_fit::Fit;
 use super::shadow::Shadow;
 use super::surface::{Surface, SurfaceInputs};
 use super::tangents::Tangents;
-use super::tonemap::ToneMap;
 use super::tools::{DrawnTool, Tools, ToolsView};
 use super::view::{FrameUniform, View, light_constants, placed_lights, shadow_from_world};
-use super::{DEPTH_FORMAT, PICTURE_FORMAT, RADIANCE_FORMAT};
 use crate::geom::SurfaceMesh;
 use crate::geom::paint::TissueMaps;
 use crate::geom::patch::radius_from_extinction_m;
@@ -96,7 +96,6 @@ impl FramePlan {
             ("absorption", 1, kind == SurfaceKind::Absorption),
             ("diffusion", 1, diffusion),
             (Tools::NAME, 1, !scene.tools.is_empty()),
-            (ToneMap::NAME, 1, true),
         ];
         Self {
             passes: all
@@ -143,12 +142,13 @@ pub struct FramePasses {
     pub tangents: Tangents,
     /// Light-path planes.
     pub light_path: LightPath,
-    /// Linear radiance, coverage in alpha.
-    pub radiance: Target,
     /// What lies at each pixel, and its depth.
     pub targets: GeometryTargets,
-    /// What is shown.
-    pub picture: Target,
+    /// The finished picture, or its radiance with coverage in alpha.
+    pub target: Target,
+    /// What a picture begins with.
+    backdrop: Option<Target>,
+    output: Output,
     shadow: Option<Shadow>,
     depth_maps: Option<DepthMaps>,
     exit: Option<Exit>,
@@ -161,7 +161,6 @@ pub struct FramePasses {
     /// Stands for the shadow map where there is none; never read.
     no_shadow: Target,
     tools: Tools,
-    tone_map: ToneMap,
     frame: wgpu::Buffer,
     lights: Vec<PlacedLight>,
     knobs: SurfaceSection,
@@ -235,7 +234,7 @@ pub fn light_path_knobs(scene: &Scene) -> LightPathKnobs {
 }
 
 impl FramePasses {
-    /// Builds what `scene` needs and nothing else, for pictures of `size` [px].
+    /// Builds what `scene` needs and nothing else, for an `output` of `size` [px].
     ///
     /// # Errors
     ///
@@ -247,6 +246,7 @@ impl FramePasses {
         surface_mesh: &SurfaceMesh,
         tissue: &TissueMaps,
         size: [u32; 2],
+        output: Output,
     ) -> Result<Self, GpuError> {
         let mesh = MeshBuffers::new(gpu, surface_mesh)?;
         let tangents = Tangents::new(gpu, surface_mesh, &mesh)?;
@@ -351,6 +351,7 @@ impl FramePasses {
         let surface = Surface::new(
             gpu,
             &scene.surface,
+            output,
             &SurfaceInputs {
                 frame: &frame,
                 light_constants: &constants,
@@ -364,15 +365,14 @@ impl FramePasses {
                 green: green.as_ref(),
             },
         )?;
-        let radiance = Target::new(gpu, "radiance", size, RADIANCE_FORMAT);
         Ok(Self {
-            tools: Tools::new(gpu, RADIANCE_FORMAT, DEPTH_FORMAT)?,
-            tone_map: ToneMap::new(gpu, &radiance, &targets.depth)?,
-            picture: Target::new(gpu, "picture", size, PICTURE_FORMAT),
+            tools: Tools::new(gpu, output)?,
+            target: Target::new(gpu, "output", size, output.format()),
+            backdrop: (output == Output::Picture).then(|| backdrop(gpu, size)),
+            output,
             mesh,
             tangents,
             light_path,
-            radiance,
             targets,
             shadow,
             depth_maps,
@@ -399,46 +399,70 @@ impl FramePasses {
     }
 
     /// Makes the picture another size.
-    ///
-    /// # Errors
-    ///
-    /// [`GpuError`] if the adapter refuses the pass that reads it.
-    pub fn resize(&mut self, gpu: &Gpu, size: [u32; 2]) -> Result<(), GpuError> {
-        self.radiance = Target::new(gpu, "radiance", size, RADIANCE_FORMAT);
-        self.picture = Target::new(gpu, "picture", size, PICTURE_FORMAT);
+    pub fn resize(&mut self, gpu: &Gpu, size: [u32; 2]) {
+        self.target = Target::new(gpu, "output", size, self.output.format());
+        self.backdrop = (self.output == Output::Picture).then(|| backdrop(gpu, size));
         self.targets = GeometryTargets::new(gpu, self.knobs.kind, size);
         if let Some(exit) = &mut self.exit {
             exit.resize(gpu, size);
         }
-        let depth_maps = self.depth_maps.as_ref();
-        let green = self.green.as_ref();
-        let shadow_map = shadow_map(self.shadow.as_ref(), depth_maps, green, &self.no_shadow);
-        self.surface.rebind(
-            gpu,
-            &SurfaceInputs {
-                frame: &self.frame,
-                light_constants: &light_constants(&self.lights),
-                cover: self.light_path.primitives().cover(),
-                geometry: &self.targets,
-                maps: &self.maps,
-                light_map: read_light_map(
-                    self.light_map.as_ref(),
-                    self.diffusion.as_ref(),
-                    &self.maps,
-                ),
-                shadow_map: &shadow_map.view,
-                exit_map: &self
-                    .exit
-                    .as_ref()
-                    .map_or(shadow_map, |exit| &exit.target)
-                    .view,
-                depth_maps,
-                green,
-            },
-        );
-        self.tone_map = ToneMap::new(gpu, &self.radiance, &self.targets.depth)?;
+        let constants = light_constants(&self.lights);
+        let bindings = self.surface.bound(gpu, &self.surface_inputs(&constants));
+        self.surface.rebind(bindings);
         self.size = size;
-        Ok(())
+    }
+
+    /// What the surface reads.
+    fn surface_inputs<'a>(
+        &'a self,
+        light_constants: &'a [(&'static str, f64)],
+    ) -> SurfaceInputs<'a> {
+        let (depth_maps, green) = (self.depth_maps.as_ref(), self.green.as_ref());
+        let shadow_map = shadow_map(self.shadow.as_ref(), depth_maps, green, &self.no_shadow);
+        let exit_map = self.exit.as_ref().map_or(shadow_map, |exit| &exit.target);
+        let (gooey, diffusion) = (self.light_map.as_ref(), self.diffusion.as_ref());
+        SurfaceInputs {
+            frame: &self.frame,
+            light_constants,
+            cover: self.light_path.primitives().cover(),
+            geometry: &self.targets,
+            maps: &self.maps,
+            light_map: read_light_map(gooey, diffusion, &self.maps),
+            shadow_map: &shadow_map.view,
+            exit_map: &exit_map.view,
+            depth_maps,
+            green,
+        }
+    }
+
+    /// Radiance of the frame that was recorded and submitted last, whatever its output: the surface and `tools` are drawn
+    /// once more by pipelines that are made for it. Costs too much for every frame.
+    ///
+    /// # Errors
+    ///
+    /// [`GpuError`] naming the pass that can't be built.
+    pub fn radiance(
+        &self,
+        gpu: &Gpu,
+        view: &View,
+        tools: &[DrawnTool],
+    ) -> Result<Target, GpuError> {
+        let output = Output::Radiance;
+        let target = Target::new(gpu, "radiance", self.size, output.format());
+        let constants = light_constants(&self.lights);
+        let inputs = self.surface_inputs(&constants);
+        let surface = Surface::new(gpu, &self.knobs, output, &inputs)?;
+        let tools_pass = Tools::new(gpu, output)?;
+        let mut timer = Timer::new(gpu, 0);
+        let mut encoder = gpu.encoder();
+        let depth = &self.targets.depth;
+        surface.record(&target, depth, &mut encoder, &mut timer);
+        let aspect = self.size[0] as f32 / self.size[1] as f32;
+        let view = ToolsView::new(view, aspect, self.knobs.exposure);
+        let views = [&target.view, &depth.view];
+        tools_pass.record(gpu, &view, tools, views, &mut encoder, &mut timer);
+        gpu.submit_and_wait(encoder);
+        Ok(target)
     }
 
     /// The maps that say where light enters, where the light path asks for them.
@@ -534,32 +558,21 @@ impl FramePasses {
         // What lies at each pixel.
         self.geometry
             .record(&self.mesh, &self.tangents, &self.targets, encoder, timer);
+        if let Some(backdrop) = &self.backdrop {
+            encoder.copy_texture_to_texture(
+                backdrop.texture.as_image_copy(),
+                self.target.texture.as_image_copy(),
+                self.target.texture.size(),
+            );
+        }
         // The one surface model of the scene.
         self.surface
-            .record(&self.radiance, &self.targets.depth, encoder, timer);
+            .record(&self.target, &self.targets.depth, encoder, timer);
         // What prods it.
-        let tools_view = ToolsView {
-            clip_from_world: frame.clip_from_world,
-            eye: frame.eye,
-        };
-        self.tools.record(
-            gpu,
-            &tools_view,
-            tools,
-            &self.radiance.view,
-            &self.targets.depth.view,
-            encoder,
-            timer,
-        );
-        // Exposure, tone curve, sRGB, backdrop.
-        self.tone_map.record(
-            gpu,
-            self.knobs.exposure,
-            &self.targets.depth,
-            &self.picture,
-            encoder,
-            timer,
-        );
+        let aspect = self.size[0] as f32 / self.size[1] as f32;
+        let view = ToolsView::new(view, aspect, self.knobs.exposure);
+        let views = [&self.target.view, &self.targets.depth.view];
+        self.tools.record(gpu, &view, tools, views, encoder, timer);
     }
 
     /// What the last submitted frame fitted.
@@ -589,9 +602,9 @@ mod tests {
     }
 
     #[test]
-    fn a_plain_scene_without_shadow_records_four_passes() {
+    fn a_plain_scene_without_shadow_records_three_passes() {
         let plan = plan("[surface]\nkind = \"plain\"");
-        assert_eq!(names(&plan), ["tangents", "geometry", "plain", "tonemap"]);
+        assert_eq!(names(&plan), ["tangents", "geometry", "plain"]);
         assert!(plan.left_out.contains(&"planes-incremental"));
     }
 
@@ -601,22 +614,14 @@ mod tests {
         let marched = plan(&format!("{method}[surface]\nkind = \"subsurface\""));
         assert_eq!(
             names(&marched),
-            [
-                "tangents",
-                "planes-full",
-                "geometry",
-                "subsurface",
-                "tonemap"
-            ]
+            ["tangents", "planes-full", "geometry", "subsurface"]
         );
         let gooey = plan(&format!(
             "{method}[surface]\nkind = \"gooey\"\nblur_passes = 3"
         ));
         assert_eq!(
             names(&gooey),
-            [
-                "tangents", "lightmap", "blur", "geometry", "gooey", "tonemap"
-            ]
+            ["tangents", "lightmap", "blur", "geometry", "gooey"]
         );
         let by_depth = |shadow: &str| {
             plan(&format!(
@@ -626,32 +631,19 @@ mod tests {
         for shadow in ["false", "true"] {
             assert_eq!(
                 names(&by_depth(shadow)),
-                [
-                    "tangents",
-                    "depth-maps",
-                    "exit",
-                    "geometry",
-                    "subsurface",
-                    "tonemap"
-                ],
+                ["tangents", "depth-maps", "exit", "geometry", "subsurface"],
                 "one map serves both"
             );
         }
         let green = |text: &str| plan(&format!("shadow = true\n[surface]\nkind = {text}"));
         assert_eq!(
             names(&green("\"wrap\"")),
-            ["tangents", "shadow", "geometry", "wrap", "tonemap"]
+            ["tangents", "shadow", "geometry", "wrap"]
         );
         let absorbing = green("\"absorption\"");
         assert_eq!(
             names(&absorbing),
-            [
-                "tangents",
-                "body-depths",
-                "geometry",
-                "absorption",
-                "tonemap"
-            ],
+            ["tangents", "body-depths", "geometry", "absorption"],
             "its first entries are the shadow map"
         );
         assert_eq!(absorbing.count_of("body-depths"), 1);
@@ -666,8 +658,7 @@ mod tests {
                 "diffusion-map",
                 "diffuse",
                 "geometry",
-                "diffusion",
-                "tonemap"
+                "diffusion"
             ]
         );
         assert_eq!(diffusing.count_of("diffuse"), 4);

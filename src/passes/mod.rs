@@ -21,7 +21,6 @@ pub mod sampled_fit;
 pub mod shadow;
 pub mod surface;
 pub mod tangents;
-pub mod tonemap;
 pub mod tools;
 pub mod view;
 

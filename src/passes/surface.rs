@@ -1,7 +1,7 @@
 //! The surface of the scene: one draw a frame over the covered pixels, by the one model the scene has.
 
 use super::depth_maps::DepthMaps;
-use super::draw::{DepthUse, Draw, DrawKind, Target, cleared, read_depth};
+use super::draw::{DepthUse, Draw, DrawKind, Output, Target, bound, cleared, kept, read_depth};
 use super::geometry::GeometryTargets;
 use super::green::Green;
 use super::light_path::CoverKind;
@@ -37,6 +37,7 @@ pub struct SurfaceInputs<'a> {
 /// The draw of the tissue.
 pub struct Surface {
     kind: SurfaceKind,
+    output: Output,
     draw: Draw,
 }
 
@@ -47,6 +48,7 @@ impl Surface {
             SurfaceKind::Plain => crate::wgsl![
                 "frame.wgsl",
                 "pack.wgsl",
+                "tone.wgsl",
                 "film.wgsl",
                 "light.wgsl",
                 "pixel.wgsl",
@@ -56,6 +58,7 @@ impl Surface {
                 CoverKind::Planes => crate::wgsl![
                     "frame.wgsl",
                     "pack.wgsl",
+                    "tone.wgsl",
                     "film.wgsl",
                     "light.wgsl",
                     "pixel.wgsl",
@@ -68,6 +71,7 @@ impl Surface {
                 CoverKind::DepthMaps => crate::wgsl![
                     "frame.wgsl",
                     "pack.wgsl",
+                    "tone.wgsl",
                     "film.wgsl",
                     "light.wgsl",
                     "pixel.wgsl",
@@ -81,6 +85,7 @@ impl Surface {
                 CoverKind::Quadrics => crate::wgsl![
                     "frame.wgsl",
                     "pack.wgsl",
+                    "tone.wgsl",
                     "film.wgsl",
                     "light.wgsl",
                     "pixel.wgsl",
@@ -94,6 +99,7 @@ impl Surface {
             SurfaceKind::Gooey => crate::wgsl![
                 "frame.wgsl",
                 "pack.wgsl",
+                "tone.wgsl",
                 "film.wgsl",
                 "light.wgsl",
                 "pixel.wgsl",
@@ -104,6 +110,7 @@ impl Surface {
             SurfaceKind::Wrap => crate::wgsl![
                 "frame.wgsl",
                 "pack.wgsl",
+                "tone.wgsl",
                 "film.wgsl",
                 "light.wgsl",
                 "pixel.wgsl",
@@ -114,6 +121,7 @@ impl Surface {
             SurfaceKind::Absorption => crate::wgsl![
                 "frame.wgsl",
                 "pack.wgsl",
+                "tone.wgsl",
                 "film.wgsl",
                 "light.wgsl",
                 "pixel.wgsl",
@@ -126,6 +134,7 @@ impl Surface {
             SurfaceKind::Diffusion => crate::wgsl![
                 "frame.wgsl",
                 "pack.wgsl",
+                "tone.wgsl",
                 "film.wgsl",
                 "light.wgsl",
                 "pixel.wgsl",
@@ -136,7 +145,7 @@ impl Surface {
         }
     }
 
-    /// Builds the model that `section` names.
+    /// Builds the model that `section` names, to draw what `output` says.
     ///
     /// # Errors
     ///
@@ -144,11 +153,13 @@ impl Surface {
     pub fn new(
         gpu: &Gpu,
         section: &SurfaceSection,
+        output: Output,
         inputs: &SurfaceInputs<'_>,
     ) -> Result<Self, GpuError> {
         Self::with_source(
             gpu,
             section,
+            output,
             inputs,
             &join(&Self::parts(section, inputs.cover)),
         )
@@ -177,10 +188,12 @@ impl Surface {
     pub fn with_source(
         gpu: &Gpu,
         section: &SurfaceSection,
+        output: Output,
         inputs: &SurfaceInputs<'_>,
         source: &str,
     ) -> Result<Self, GpuError> {
         let mut constants = inputs.light_constants.to_vec();
+        constants.push(output.tone());
         if section.kind == SurfaceKind::Subsurface {
             let quadrature = match section.quadrature {
                 Quadrature::ByLayer => 0.0,
@@ -220,8 +233,8 @@ impl Surface {
                 source,
                 vertex: "pixel_vertex",
                 attributes: &[],
-                fragment: Some(("fragment", &[super::RADIANCE_FORMAT])),
-                blend: None,
+                fragment: Some(("fragment", &[output.format()])),
+                blend: output.blend(),
                 depth: DepthUse::Covered,
                 cull: None,
                 constants: &constants,
@@ -230,13 +243,19 @@ impl Surface {
         )?;
         Ok(Self {
             kind: section.kind,
+            output,
             draw,
         })
     }
 
-    /// Reads from `inputs` of another size than before.
-    pub fn rebind(&mut self, gpu: &Gpu, inputs: &SurfaceInputs<'_>) {
-        self.draw.rebind(gpu, self.kind.name(), &bindings(inputs));
+    /// What the model binds to read from `inputs` of another size than before, for [`Surface::rebind`].
+    pub fn bound(&self, gpu: &Gpu, inputs: &SurfaceInputs<'_>) -> wgpu::BindGroup {
+        bound(gpu, self.kind.name(), &bindings(inputs))
+    }
+
+    /// Takes what [`Surface::bound`] made.
+    pub fn rebind(&mut self, bindings: wgpu::BindGroup) {
+        self.draw.rebind(bindings);
     }
 
     /// Name in logs.
@@ -244,17 +263,20 @@ impl Surface {
         self.kind.name()
     }
 
-    /// Adds the draw to `encoder`: radiance where there is tissue, nothing elsewhere.
+    /// Adds the draw to `encoder`: the tissue, over the backdrop that a picture holds, or radiance and nothing elsewhere.
     pub fn record(
         &self,
-        radiance: &Target,
+        target: &Target,
         depth: &Target,
         encoder: &mut wgpu::CommandEncoder,
         timer: &mut Timer,
     ) {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some(self.name()),
-            color_attachments: &[cleared(&radiance.view)],
+            color_attachments: &[match self.output {
+                Output::Picture => kept(&target.view),
+                Output::Radiance => cleared(&target.view),
+            }],
             depth_stencil_attachment: Some(read_depth(&depth.view)),
             timestamp_writes: timer.render(self.name()),
             ..Default::default()

@@ -1,15 +1,17 @@
 //! The tools, drawn over the tissue: one draw a frame, an instance a tool.
 
-use super::draw::kept;
+use super::draw::{Output, kept};
+use super::view::View;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, bind, compile, join, storage, uniform};
 use glam::{Mat4, Vec3};
 
 /// Tools that can be drawn at once; a scene has a few.
 pub const TOOLS_MAX: usize = 16;
 
-/// Rings of a round end and steps around the axis: fine enough that no facet shows at arm's length.
-const RINGS: u32 = 12;
-const STEPS: u32 = 32;
+/// Rings of a round end and steps around the axis: a circle of 24 corners misses a round outline of 40 pixels by a
+/// third of one, and a software adapter pays for each corner.
+const RINGS: u32 = 8;
+const STEPS: u32 = 24;
 
 /// A capsule to draw; a sphere has no axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,8 +30,18 @@ pub struct DrawnTool {
 pub struct ToolsView {
     /// World to clip space.
     pub clip_from_world: [f32; 16],
-    /// The camera [m]; `w` is unused.
-    pub eye: [f32; 4],
+    /// The camera [m], and what radiance is multiplied by before the tone curve.
+    pub eye_exposure: [f32; 4],
+}
+
+impl ToolsView {
+    /// What `view` shows in a picture of that width over height.
+    pub fn new(view: &View, aspect: f32, exposure: f32) -> Self {
+        Self {
+            clip_from_world: view.clip_from_world(aspect).to_cols_array(),
+            eye_exposure: view.eye.extend(exposure).to_array(),
+        }
+    }
 }
 
 /// Mirror of `Tool` in `shaders/tools.wgsl`.
@@ -54,25 +66,21 @@ impl Tools {
     /// Name in logs.
     pub const NAME: &'static str = "tools";
     /// The WGSL files of this pass, joined in this order.
-    pub const WGSL: &'static [Wgsl] = crate::wgsl!["tools.wgsl"];
+    pub const WGSL: &'static [Wgsl] = crate::wgsl!["tone.wgsl", "tools.wgsl"];
 
-    /// Builds the pass for a colour and a depth target of these formats.
+    /// Builds the pass, to draw what `output` says.
     ///
     /// # Errors
     ///
     /// [`GpuError::Shader`] if the WGSL does not compile on this adapter.
-    pub fn new(
-        gpu: &Gpu,
-        color: wgpu::TextureFormat,
-        depth: wgpu::TextureFormat,
-    ) -> Result<Self, GpuError> {
+    pub fn new(gpu: &Gpu, output: Output) -> Result<Self, GpuError> {
         let module = compile(gpu, Self::NAME, Self::WGSL, &join(Self::WGSL))?;
         let view = uniform(
             gpu,
             "tools view",
             &ToolsView {
                 clip_from_world: Mat4::IDENTITY.to_cols_array(),
-                eye: [0.0; 4],
+                eye_exposure: [0.0; 4],
             },
         );
         let nothing = [ToolData {
@@ -115,9 +123,10 @@ impl Tools {
                     ..Default::default()
                 },
                 depth_stencil: Some(wgpu::DepthStencilState {
-                    format: depth,
+                    format: super::DEPTH_FORMAT,
                     depth_write_enabled: Some(true),
-                    depth_compare: Some(wgpu::CompareFunction::Less),
+                    // Equal too: radiance may be asked for where the picture has left its depth.
+                    depth_compare: Some(wgpu::CompareFunction::LessEqual),
                     stencil: wgpu::StencilState::default(),
                     bias: wgpu::DepthBiasState::default(),
                 }),
@@ -125,8 +134,15 @@ impl Tools {
                 fragment: Some(wgpu::FragmentState {
                     module: &module,
                     entry_point: Some("fragment"),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
-                    targets: &[Some(color.into())],
+                    compilation_options: wgpu::PipelineCompilationOptions {
+                        constants: &[output.tone()],
+                        ..Default::default()
+                    },
+                    targets: &[Some(wgpu::ColorTargetState {
+                        format: output.format(),
+                        blend: output.blend(),
+                        write_mask: wgpu::ColorWrites::ALL,
+                    })],
                 }),
                 multiview_mask: None,
                 cache: None,
@@ -141,19 +157,17 @@ impl Tools {
         })
     }
 
-    /// Draws `tools` into the targets of a finished surface; without tools there is no pass.
+    /// Draws `tools` into colour and depth of a finished surface; without tools there is no pass.
     ///
     /// # Panics
     ///
     /// If there are more than [`TOOLS_MAX`].
-    #[allow(clippy::too_many_arguments)]
     pub fn record(
         &self,
         gpu: &Gpu,
         view: &ToolsView,
         tools: &[DrawnTool],
-        color: &wgpu::TextureView,
-        depth: &wgpu::TextureView,
+        [color, depth]: [&wgpu::TextureView; 2],
         encoder: &mut wgpu::CommandEncoder,
         timer: &mut Timer,
     ) {

@@ -141,8 +141,8 @@ pub struct FrameUniform {
     pub blur_radius_m: f32,
     pub noise_m: f32,
     pub noise_lookups: u32,
+    pub exposure: f32,
     pub pad0: f32,
-    pub pad1: f32,
 }
 
 /// The lights of a scene, the one that casts shadows first.
@@ -248,8 +248,8 @@ impl FrameUniform {
             blur_radius_m: surface.blur_radius_m,
             noise_m: surface.noise_m,
             noise_lookups: surface.noise_lookups,
+            exposure: surface.exposure,
             pad0: 0.0,
-            pad1: 0.0,
         }
     }
 }

@@ -16,6 +16,7 @@ use crate::measure::page::{Block, Table};
 use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
 use crate::measure::stats::Stats;
 use crate::optics::pack::from_octahedral;
+use crate::passes::draw::Output;
 use crate::passes::frame::FramePasses;
 use crate::passes::geometry::Geometry;
 use crate::passes::view::View;
@@ -203,7 +204,8 @@ impl Stretch {
         let rest = RestBox { low, high };
         let size = [PICTURE_PX; 2];
         let gpu = &self.gpu;
-        let passes = FramePasses::new(gpu, scene, &rest, &self.sheet, &maps, size)?;
+        let passes =
+            FramePasses::new(gpu, scene, &rest, &self.sheet, &maps, size, Output::Picture)?;
         let view = View {
             eye: 2.0 * SIDE_M * Vec3::Z,
             target: Vec3::ZERO,
