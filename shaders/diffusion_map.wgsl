@@ -30,8 +30,6 @@
 override UNIT_FRAMES: u32 = 0u;
 // 1: a power of the colour map is blurred along with the light.
 override COLORED: u32 = 0u;
-// Level of the colour maps whose texels are as large as those of the light map.
-override COLOR_LEVEL: f32 = 0.0;
 
 struct Varyings {
     @builtin(position) clip: vec4f,
@@ -67,7 +65,7 @@ struct Texel {
 }
 
 fn linear_color(map: texture_2d<f32>, uv: vec2f) -> vec4f {
-    let texel = textureSampleLevel(map, linear_sampler, uv, COLOR_LEVEL);
+    let texel = textureSampleLevel(map, linear_sampler, uv, 0.0);
     return vec4f(texel.rgb * texel.rgb, texel.a);
 }
 

@@ -41,8 +41,6 @@ struct Frame {
     // Depth range of the shadow map [m], and how far behind it a point counts as lit [m].
     shadow_depth_m: f32,
     shadow_bias_m: f32,
-    // Level of the maps whose texels are as large as a pixel.
-    map_level: f32,
     // Radius of the disc that an inner layer is blurred by, as a share of the way to it.
     inner_blur: f32,
     // Share of the light that an opaque layer keeps from those below.
@@ -56,6 +54,7 @@ struct Frame {
     // What radiance is multiplied by before the tone curve.
     exposure: f32,
     pad0: f32,
+    pad1: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

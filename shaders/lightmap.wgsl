@@ -33,8 +33,6 @@ override FOLLOWS_VOLUME: u32 = 0u;
 override BLURRED: u32 = 1u;
 // 1: the outer layer's opacity takes light away.
 override SHADES: u32 = 0u;
-// Level of the maps whose texels are as large as those of the light map.
-override COLOR_LEVEL: f32 = 0.0;
 
 struct Varyings {
     @builtin(position) clip: vec4f,
@@ -85,7 +83,7 @@ struct Texel {
 fn lightmap_fragment(in: Varyings) -> Texel {
     var light = in.light;
     if SHADES != 0u {
-        let opacity = textureSampleLevel(outer_map, linear_sampler, in.uv, COLOR_LEVEL).a;
+        let opacity = textureSampleLevel(outer_map, linear_sampler, in.uv, 0.0).a;
         light *= let_through(opacity * frame.outer_opacity, frame.layer_shadow);
     }
     return Texel(vec4f(light, select(1.0, in.chart, BLURRED != 0u)), in.metric);

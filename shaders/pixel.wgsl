@@ -66,15 +66,17 @@ struct Pixel {
     outer: vec4f,
 }
 
+// The maps are bound at the one level whose texels are as large as a pixel.
+//
 // Colours are stored as square roots: 8 bits then resolve the dark, and the sampler filters plain bytes.
 fn color_at(map: texture_2d<f32>, uv: vec2f) -> vec4f {
-    let texel = textureSampleLevel(map, linear_sampler, uv, frame.map_level);
+    let texel = textureSampleLevel(map, linear_sampler, uv, 0.0);
     return vec4f(texel.rgb * texel.rgb, texel.a);
 }
 
 // The normal with the bumps of the normal map, whose green points to smaller v.
 fn relief_at(uv: vec2f, normal: vec3f, tangent: vec3f, bitangent: vec3f) -> vec3f {
-    let bump = textureSampleLevel(normal_map, linear_sampler, uv, frame.map_level).xyz * 2.0 - 1.0;
+    let bump = textureSampleLevel(normal_map, linear_sampler, uv, 0.0).xyz * 2.0 - 1.0;
     return normalize(
         frame.relief * (bump.x * tangent - bump.y * bitangent) + max(bump.z, 0.05) * normal,
     );

@@ -208,7 +208,7 @@ fn exit_error(gpu: &Gpu, pass_of: impl Fn(&wgpu::Buffer, &SurfaceMesh) -> Exit) 
         fov_y: 0.5,
     };
     let section = SurfaceSection::default();
-    let frame = FrameUniform::new(&view, [side; 2], &lights(), &section, Mat4::IDENTITY, 1.0);
+    let frame = FrameUniform::new(&view, [side; 2], &lights(), &section, Mat4::IDENTITY);
     let frame = uniform(gpu, "frame", &frame);
     let pass = pass_of(&frame, &mesh);
     let buffers = MeshBuffers::new(gpu, &mesh).expect("the surface fits");

@@ -309,7 +309,6 @@ fn mirrors() -> Vec<Mirror> {
                 wetness,
                 shadow_depth_m,
                 shadow_bias_m,
-                map_level,
                 inner_blur,
                 layer_shadow,
                 blur_radius_m,
@@ -317,6 +316,7 @@ fn mirrors() -> Vec<Mirror> {
                 noise_lookups,
                 exposure,
                 pad0,
+                pad1,
             }
         ),
         mirror!(

@@ -581,7 +581,7 @@ fn tone_difference(gpu: &Gpu, source: &str) -> f32 {
 #[test]
 fn tone_map_matches_the_cpu_twin() {
     let difference = tone_difference(&gpu(), &join(wgsl!["tone.wgsl"]));
-    // A tenth of a step of 8 bits; llvmpipe's power is good to 1e-5.
+    // A tenth of a step of 8 bits; the fit of the power is good to 2.2e-4.
     assert!(difference < 4e-4, "differ by {difference}");
 }
 
@@ -723,7 +723,6 @@ fn march_difference(gpu: &Gpu, source: &str, cover: CoverKind, rule: Rule, sampl
         &[far_light(to_light)],
         &section,
         glam::Mat4::IDENTITY,
-        1.0,
     );
     let quadrature = match rule {
         Rule::ByLayer => 0,
@@ -980,7 +979,7 @@ fn eight_layers_difference(gpu: &Gpu, source: &str, rule: Rule, samples: u32) ->
         fov_y: 0.5,
     };
     let lights = [far_light(to_light)];
-    let frame = FrameUniform::new(&view, [64; 2], &lights, &section, glam::Mat4::IDENTITY, 1.0);
+    let frame = FrameUniform::new(&view, [64; 2], &lights, &section, glam::Mat4::IDENTITY);
     let quadrature = match rule {
         Rule::ByLayer => 0,
         Rule::ClosedForm => 1,

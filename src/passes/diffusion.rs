@@ -4,7 +4,7 @@
 use super::draw::{DepthUse, Draw, DrawKind, Target, cleared};
 use super::green::Green;
 use super::lightmap::uv_per_m;
-use super::maps::Maps;
+use super::maps::{Maps, level_for};
 use super::mesh_buffers::MeshBuffers;
 use super::tangents::Tangents;
 use crate::geom::SurfaceMesh;
@@ -290,7 +290,7 @@ fn light_draw(
     } else {
         Diffusion::WGSL
     };
-    let shrunk = f64::from(inputs.map_size_px) / f64::from(section.light_map_size_px);
+    let color_level = level_for(inputs.map_size_px as f32 / section.light_map_size_px as f32);
     let mut constants = inputs.light_constants.to_vec();
     constants.extend([
         (
@@ -301,7 +301,6 @@ fn light_draw(
             "COLORED",
             f64::from(u8::from(section.diffusion.color_in_map > 0.0)),
         ),
-        ("COLOR_LEVEL", shrunk.log2().clamp(0.0, 3.0).round()),
     ]);
     if translucent {
         constants.extend(Green::constants(section));
@@ -314,8 +313,8 @@ fn light_draw(
         Binding::Sampler(&inputs.maps.sampler),
         Binding::Read(&inputs.tangents.normals),
         Binding::Read(&inputs.tangents.uv_gradients),
-        Binding::Texture(&inputs.maps.outer),
-        Binding::Texture(&inputs.maps.inner),
+        Binding::Texture(inputs.maps.outer.at(color_level)),
+        Binding::Texture(inputs.maps.inner.at(color_level)),
         Binding::Read(&rest),
         Binding::Depth(inputs.shadow_map),
     ];

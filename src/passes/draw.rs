@@ -173,15 +173,16 @@ impl Draw {
         }
     }
 
-    /// Takes `bindings` in place of those given to [`Draw::new`]: of the same kinds, from [`bound`].
-    pub fn rebind(&mut self, bindings: wgpu::BindGroup) {
-        self.bindings = bindings;
-    }
-
     /// Makes `pass` use this pipeline and its bindings.
     pub fn set(&self, pass: &mut wgpu::RenderPass<'_>) {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.bindings, &[]);
+    }
+
+    /// Makes `pass` use this pipeline with other `bindings` of the same kinds, from [`bound`].
+    pub fn set_bound(&self, pass: &mut wgpu::RenderPass<'_>, bindings: &wgpu::BindGroup) {
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, bindings, &[]);
     }
 }
 

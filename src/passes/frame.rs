@@ -21,7 +21,9 @@ use super::shadow::Shadow;
 use super::surface::{Surface, SurfaceInputs};
 use super::tangents::Tangents;
 use super::tools::{DrawnTool, Tools, ToolsView};
-use super::view::{FrameUniform, View, light_constants, placed_lights, shadow_from_world};
+use super::view::{
+    FrameUniform, View, light_constants, map_level, placed_lights, shadow_from_world,
+};
 use crate::geom::SurfaceMesh;
 use crate::geom::paint::TissueMaps;
 use crate::geom::patch::radius_from_extinction_m;
@@ -194,7 +196,7 @@ fn read_light_map<'a>(
     gooey
         .map(LightMap::view)
         .or(diffusion.map(Diffusion::view))
-        .unwrap_or(&maps.outer)
+        .unwrap_or(maps.outer.at(0))
 }
 
 /// How far light is followed below the surface of a scene [m]: the told radius, or from the densest layer's extinction.
@@ -286,7 +288,7 @@ impl FramePasses {
         let frame = uniform(
             gpu,
             "frame",
-            &FrameUniform::new(&view, size, &lights, &scene.surface, Mat4::IDENTITY, 1.0),
+            &FrameUniform::new(&view, size, &lights, &scene.surface, Mat4::IDENTITY),
         );
         let exit = if depth_maps.is_some() {
             Some(Exit::new(gpu, surface_mesh, &frame, size)?)
@@ -412,6 +414,11 @@ impl FramePasses {
         self.size = size;
     }
 
+    /// The level of the maps that suits `view`.
+    fn map_level(&self, view: &View) -> usize {
+        map_level(view, self.size[1], self.uv_per_m * self.map_size_px as f32)
+    }
+
     /// What the surface reads.
     fn surface_inputs<'a>(
         &'a self,
@@ -456,7 +463,8 @@ impl FramePasses {
         let mut timer = Timer::new(gpu, 0);
         let mut encoder = gpu.encoder();
         let depth = &self.targets.depth;
-        surface.record(&target, depth, &mut encoder, &mut timer);
+        let level = self.map_level(view);
+        surface.record(&target, depth, level, &mut encoder, &mut timer);
         let aspect = self.size[0] as f32 / self.size[1] as f32;
         let view = ToolsView::new(view, aspect, self.knobs.exposure);
         let views = [&target.view, &depth.view];
@@ -520,7 +528,6 @@ impl FramePasses {
             &self.lights,
             &self.knobs,
             shadow_from_world,
-            self.uv_per_m * self.map_size_px as f32,
         );
         gpu.queue
             .write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
@@ -566,8 +573,9 @@ impl FramePasses {
             );
         }
         // The one surface model of the scene.
+        let (depth, level) = (&self.targets.depth, self.map_level(view));
         self.surface
-            .record(&self.target, &self.targets.depth, encoder, timer);
+            .record(&self.target, depth, level, encoder, timer);
         // What prods it.
         let aspect = self.size[0] as f32 / self.size[1] as f32;
         let view = ToolsView::new(view, aspect, self.knobs.exposure);

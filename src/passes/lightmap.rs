@@ -2,7 +2,7 @@
 
 use super::diffusion::charts_at_rest;
 use super::draw::{DepthUse, Draw, DrawKind, Target, cleared};
-use super::maps::Maps;
+use super::maps::{Maps, level_for};
 use super::mesh_buffers::MeshBuffers;
 use super::tangents::Tangents;
 use crate::geom::SurfaceMesh;
@@ -128,14 +128,13 @@ impl LightMap {
         let metric = Target::new(gpu, "metric", size, FORMAT);
         let rest = charts_at_rest(gpu, surface_mesh)?;
         let yes = |is: bool| f64::from(u8::from(is));
-        let shrunk = f64::from(inputs.map_size_px) / f64::from(section.light_map_size_px);
+        let color_level = level_for(inputs.map_size_px as f32 / section.light_map_size_px as f32);
         let mut constants = inputs.light_constants.to_vec();
         constants.extend([
             ("UNIT_FRAMES", yes(section.uv_metric == UvMetric::Unit)),
             ("FOLLOWS_VOLUME", yes(section.thickness_follows_volume)),
             ("BLURRED", yes(section.blur_passes > 0)),
             ("SHADES", yes(section.layer_shadow > 0.0)),
-            ("COLOR_LEVEL", shrunk.log2().clamp(0.0, 3.0).round()),
         ]);
         let draw = Draw::new(
             gpu,
@@ -161,7 +160,7 @@ impl LightMap {
                 Binding::Read(&inputs.tangents.uv_gradients),
                 Binding::Read(&rest),
                 Binding::Sampler(&inputs.maps.sampler),
-                Binding::Texture(&inputs.maps.outer),
+                Binding::Texture(inputs.maps.outer.at(color_level)),
             ],
         )?;
         let passes = section.blur_passes as usize;

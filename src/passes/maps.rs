@@ -11,20 +11,47 @@ use image::{DynamicImage, RgbaImage};
 /// Textures of four layers each that the shaders have room for.
 pub const LAYER_MAPS_MAX: usize = 2;
 
+/// Levels of detail of a map: further ones would mix charts of the atlas.
+pub const LEVELS: usize = 4;
+
+/// A map at each level of detail. A frame binds the one level that suits it: a software adapter reads a texture that has no
+/// other a fifth faster.
+pub struct Leveled([wgpu::TextureView; LEVELS]);
+
+impl Leveled {
+    /// The map at `level`, 0 the finest.
+    ///
+    /// # Panics
+    ///
+    /// If `level` is not below [`LEVELS`].
+    pub fn at(&self, level: usize) -> &wgpu::TextureView {
+        &self.0[level]
+    }
+}
+
+/// The level at which a texel is about as large as `texels` of the finest.
+pub fn level_for(texels: f32) -> usize {
+    texels
+        .max(1e-6)
+        .log2()
+        .round()
+        .clamp(0.0, (LEVELS - 1) as f32) as usize
+}
+
 /// Views of the maps, and how they are sampled.
 pub struct Maps {
     /// Square roots of the linear colour of the outer layer, opacity in alpha.
-    pub outer: wgpu::TextureView,
+    pub outer: Leveled,
     /// Tangent-space normals.
-    pub normal: wgpu::TextureView,
+    pub normal: Leveled,
     /// Square roots of the linear colour of the deep tissue.
-    pub inner: wgpu::TextureView,
+    pub inner: Leveled,
     /// Lower boundaries of layers 1 to 4, as shares of the deepest, and of layers 5 to 8; of two views the second is
     /// the first where there are no more than four.
     pub layers: [wgpu::TextureView; LAYER_MAPS_MAX],
     /// Clouds that move the march, where a scene asks for them.
     pub noise: Option<wgpu::TextureView>,
-    /// Linear, with mipmaps.
+    /// Linear.
     pub sampler: wgpu::Sampler,
 }
 
@@ -32,9 +59,9 @@ impl Maps {
     /// Uploads `maps`, and the clouds if `noise` is made of them.
     pub fn new(gpu: &Gpu, maps: &TissueMaps, noise: Noise) -> Self {
         Self {
-            outer: upload(gpu, "outer map", square_roots(&maps.outer)),
-            normal: upload(gpu, "normal map", maps.normal.clone()),
-            inner: upload(gpu, "inner map", square_roots(&maps.inner)),
+            outer: upload_levels(gpu, "outer map", square_roots(&maps.outer)),
+            normal: upload_levels(gpu, "normal map", maps.normal.clone()),
+            inner: upload_levels(gpu, "inner map", square_roots(&maps.inner)),
             layers: std::array::from_fn(|k| {
                 let last = maps.layers.len() - 1;
                 upload_depths(gpu, &maps.layers[k.min(last)])
@@ -46,14 +73,12 @@ impl Maps {
                     let [r, g] = clouds[(y * side + x) as usize];
                     image::Rgba([r, g, 0, 255])
                 });
-                upload(gpu, "noise", picture)
+                upload(gpu, "noise", &picture)
             }),
             sampler: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("maps"),
                 mag_filter: wgpu::FilterMode::Linear,
                 min_filter: wgpu::FilterMode::Linear,
-                // The nearest level: on a software adapter two levels cost twice the time.
-                mipmap_filter: wgpu::MipmapFilterMode::Nearest,
                 ..Default::default()
             }),
         }
@@ -104,7 +129,7 @@ fn upload_depths(gpu: &Gpu, image: &DynamicImage) -> wgpu::TextureView {
             );
             texture.create_view(&wgpu::TextureViewDescriptor::default())
         }
-        _ => upload(gpu, "layer map", image.to_rgba8()),
+        _ => upload(gpu, "layer map", &image.to_rgba8()),
     }
 }
 
@@ -156,24 +181,44 @@ fn write_level(gpu: &Gpu, texture: &wgpu::Texture, level: u32, width: u32, bytes
     );
 }
 
-fn upload(gpu: &Gpu, label: &str, image: RgbaImage) -> wgpu::TextureView {
-    // Four levels: further ones would mix charts of the atlas.
-    let levels = 4.min(1 + image.width().min(image.height()).ilog2());
+/// A texture of one level.
+fn upload(gpu: &Gpu, label: &str, image: &RgbaImage) -> wgpu::TextureView {
     let texture = texture(
         gpu,
         label,
         image.dimensions().into(),
-        levels,
+        1,
+        wgpu::TextureFormat::Rgba8Unorm,
+    );
+    write_level(gpu, &texture, 0, image.width(), image);
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+/// A texture and each half, quarter … of it; of a picture too small for that the last level stands for those beyond.
+fn upload_levels(gpu: &Gpu, label: &str, image: RgbaImage) -> Leveled {
+    let levels = LEVELS.min(1 + image.width().min(image.height()).ilog2() as usize);
+    let texture = texture(
+        gpu,
+        label,
+        image.dimensions().into(),
+        levels as u32,
         wgpu::TextureFormat::Rgba8Unorm,
     );
     let mut level_image = image;
-    for level in 0..levels {
+    for level in 0..levels as u32 {
         if level > 0 {
             level_image = halved(&level_image);
         }
         write_level(gpu, &texture, level, level_image.width(), &level_image);
     }
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
+    Leveled(std::array::from_fn(|level| {
+        texture.create_view(&wgpu::TextureViewDescriptor {
+            label: Some(label),
+            base_mip_level: level.min(levels - 1) as u32,
+            mip_level_count: Some(1),
+            ..Default::default()
+        })
+    }))
 }
 
 /// Half the size: the mean of each 2 x 2 texels, as they are encoded.

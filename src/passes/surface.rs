@@ -5,7 +5,7 @@ use super::draw::{DepthUse, Draw, DrawKind, Output, Target, bound, cleared, kept
 use super::geometry::GeometryTargets;
 use super::green::Green;
 use super::light_path::CoverKind;
-use super::maps::Maps;
+use super::maps::{LEVELS, Maps};
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join};
 use crate::optics::LAYERS;
 use crate::scene::{InnerLight, InnerTaps, Noise, Quadrature, SurfaceKind, SurfaceSection};
@@ -39,6 +39,8 @@ pub struct Surface {
     kind: SurfaceKind,
     output: Output,
     draw: Draw,
+    /// What the model binds at each level of the maps.
+    bindings: [wgpu::BindGroup; LEVELS],
 }
 
 impl Surface {
@@ -239,23 +241,24 @@ impl Surface {
                 cull: None,
                 constants: &constants,
             },
-            &bindings(inputs),
+            &bindings(inputs, 0),
         )?;
         Ok(Self {
             kind: section.kind,
             output,
             draw,
+            bindings: bound_levels(gpu, section.kind, inputs),
         })
     }
 
     /// What the model binds to read from `inputs` of another size than before, for [`Surface::rebind`].
-    pub fn bound(&self, gpu: &Gpu, inputs: &SurfaceInputs<'_>) -> wgpu::BindGroup {
-        bound(gpu, self.kind.name(), &bindings(inputs))
+    pub fn bound(&self, gpu: &Gpu, inputs: &SurfaceInputs<'_>) -> [wgpu::BindGroup; LEVELS] {
+        bound_levels(gpu, self.kind, inputs)
     }
 
     /// Takes what [`Surface::bound`] made.
-    pub fn rebind(&mut self, bindings: wgpu::BindGroup) {
-        self.draw.rebind(bindings);
+    pub fn rebind(&mut self, bindings: [wgpu::BindGroup; LEVELS]) {
+        self.bindings = bindings;
     }
 
     /// Name in logs.
@@ -263,11 +266,12 @@ impl Surface {
         self.kind.name()
     }
 
-    /// Adds the draw to `encoder`: the tissue, over the backdrop that a picture holds, or radiance and nothing elsewhere.
+    /// Adds the draw with the maps at `level` to `encoder`: the tissue, over the backdrop that a picture holds, or radiance and nothing elsewhere.
     pub fn record(
         &self,
         target: &Target,
         depth: &Target,
+        level: usize,
         encoder: &mut wgpu::CommandEncoder,
         timer: &mut Timer,
     ) {
@@ -281,7 +285,7 @@ impl Surface {
             timestamp_writes: timer.render(self.name()),
             ..Default::default()
         });
-        self.draw.set(&mut pass);
+        self.draw.set_bound(&mut pass, &self.bindings[level]);
         pass.draw(0..3, 0..1);
     }
 }
@@ -307,17 +311,25 @@ fn gooey_constants(section: &SurfaceSection) -> [(&'static str, f64); 4] {
     ]
 }
 
-/// The bindings of `shaders/pixel.wgsl`, in its order, and of `shaders/light_depth.wgsl` or `shaders/green.wgsl`.
-fn bindings<'a>(inputs: &SurfaceInputs<'a>) -> Vec<Binding<'a>> {
+fn bound_levels(
+    gpu: &Gpu,
+    kind: SurfaceKind,
+    inputs: &SurfaceInputs<'_>,
+) -> [wgpu::BindGroup; LEVELS] {
+    std::array::from_fn(|level| bound(gpu, kind.name(), &bindings(inputs, level)))
+}
+
+/// The bindings of `shaders/pixel.wgsl`, in its order, with the maps at `level`, and of `shaders/light_depth.wgsl` or `shaders/green.wgsl`.
+fn bindings<'a>(inputs: &SurfaceInputs<'a>, level: usize) -> Vec<Binding<'a>> {
     let mut bindings = vec![
         Binding::Uniform(inputs.frame),
         Binding::Integers(&inputs.geometry.base.view),
         Binding::Integers(&inputs.geometry.detail.view),
         Binding::Depth(&inputs.geometry.depth.view),
         Binding::Sampler(&inputs.maps.sampler),
-        Binding::Texture(&inputs.maps.outer),
-        Binding::Texture(&inputs.maps.normal),
-        Binding::Texture(&inputs.maps.inner),
+        Binding::Texture(inputs.maps.outer.at(level)),
+        Binding::Texture(inputs.maps.normal.at(level)),
+        Binding::Texture(inputs.maps.inner.at(level)),
         Binding::Texture(&inputs.maps.layers[0]),
         Binding::Texture(inputs.light_map),
         Binding::Depth(inputs.shadow_map),
@@ -336,7 +348,13 @@ fn bindings<'a>(inputs: &SurfaceInputs<'a>) -> Vec<Binding<'a>> {
         Binding::Integers(normals),
         Binding::Depth(exits),
         Binding::Texture(&inputs.maps.layers[1]),
-        Binding::Texture(inputs.maps.noise.as_ref().unwrap_or(&inputs.maps.outer)),
+        Binding::Texture(
+            inputs
+                .maps
+                .noise
+                .as_ref()
+                .unwrap_or(inputs.maps.outer.at(level)),
+        ),
     ]);
     bindings
 }

@@ -1,5 +1,6 @@
 //! What the shaders know of a frame: camera, lights, layers and knobs, as one uniform.
 
+use super::maps::level_for;
 use crate::optics::LAYERS_MAX;
 use crate::scene::{
     INNER_MAX, InnerSection, LIGHTS_MAX, PlacedLight, RestBox, Scene, SurfaceSection,
@@ -135,7 +136,6 @@ pub struct FrameUniform {
     pub wetness: f32,
     pub shadow_depth_m: f32,
     pub shadow_bias_m: f32,
-    pub map_level: f32,
     pub inner_blur: f32,
     pub layer_shadow: f32,
     pub blur_radius_m: f32,
@@ -143,6 +143,7 @@ pub struct FrameUniform {
     pub noise_lookups: u32,
     pub exposure: f32,
     pub pad0: f32,
+    pub pad1: f32,
 }
 
 /// The lights of a scene, the one that casts shadows first.
@@ -173,15 +174,13 @@ pub fn light_constants(lights: &[PlacedLight]) -> Vec<(&'static str, f64)> {
 }
 
 impl FrameUniform {
-    /// Camera, lights and knobs of one frame of a picture of `size` [px]; `map_px_per_m` is how many texels of
-    /// the maps lie on a metre of the surface.
+    /// Camera, lights and knobs of one frame of a picture of `size` [px].
     pub fn new(
         view: &View,
         size: [u32; 2],
         lights: &[PlacedLight],
         surface: &SurfaceSection,
         shadow_from_world: Mat4,
-        map_px_per_m: f32,
     ) -> Self {
         let light = |k: usize| match lights.get(k) {
             None => LightUniform {
@@ -242,7 +241,6 @@ impl FrameUniform {
             shadow_depth_m: 1.0 / along,
             // Two texels: what a slope of 60 degrees rises over one.
             shadow_bias_m: 2.0 * 2.0 / (across * super::shadow::SIZE_PX as f32),
-            map_level: map_level(view, size[1], map_px_per_m),
             inner_blur: surface.inner_blur,
             layer_shadow: surface.layer_shadow,
             blur_radius_m: surface.blur_radius_m,
@@ -250,17 +248,18 @@ impl FrameUniform {
             noise_lookups: surface.noise_lookups,
             exposure: surface.exposure,
             pad0: 0.0,
+            pad1: 0.0,
         }
     }
 }
 
 /// Level of the maps at which a texel is about as large as a pixel of a picture `height_px` high, at the
-/// distance of the view's target. One for the whole frame: levels by the pixel cost a software adapter more.
-fn map_level(view: &View, height_px: u32, map_px_per_m: f32) -> f32 {
+/// distance of the view's target; `map_px_per_m` texels lie on a metre of the surface. One for the whole frame: levels by the
+/// pixel cost a software adapter more.
+pub fn map_level(view: &View, height_px: u32, map_px_per_m: f32) -> usize {
     let pixel_m =
         2.0 * view.eye.distance(view.target) * (0.5 * view.fov_y).tan() / height_px as f32;
-    let texels = pixel_m * map_px_per_m;
-    texels.max(1e-6).log2().round().clamp(0.0, 3.0)
+    level_for(pixel_m * map_px_per_m)
 }
 
 #[cfg(test)]
