@@ -8,7 +8,17 @@ use glam::Vec3;
 pub fn displayed(radiance: Vec3) -> Vec3 {
     let x = 0.8 * radiance.max(Vec3::ZERO);
     let curve = x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14);
-    curve.clamp(Vec3::ZERO, Vec3::ONE).map(srgb_from_linear)
+    curve.clamp(Vec3::ZERO, Vec3::ONE).map(srgb_by_roots)
+}
+
+/// As [`srgb_from_linear`], its power by a sum of the 0th to 3rd powers of the fourth root: off by 2.2e-4 at most.
+fn srgb_by_roots(linear: f32) -> f32 {
+    if linear < 0.003_130_8 {
+        return 12.92 * linear;
+    }
+    let half = linear.sqrt();
+    let quarter = half.sqrt();
+    half * (0.952_575_5 - 0.136_825_6 * quarter) + 0.255_796_5 * quarter - 0.071_761_2
 }
 
 /// sRGB encoding of a linear value, both 0 to 1.
@@ -44,6 +54,16 @@ mod tests {
     }
 
     #[test]
+    fn roots_stand_for_the_power_within_an_eighteenth_of_a_step_of_eight_bits() {
+        let worst = (0..=100_000)
+            .map(|step| step as f32 / 1e5)
+            .map(|linear| (srgb_by_roots(linear) - srgb_from_linear(linear)).abs())
+            .fold(0.0, f32::max);
+        // Measured: 2.16e-4; where the two halves meet, 2.1e-4.
+        assert!(worst < 2.2e-4, "off by {worst}");
+    }
+
+    #[test]
     fn more_light_is_never_shown_darker_and_nothing_is_black() {
         assert_eq!(displayed(Vec3::ZERO), Vec3::ZERO);
         assert_eq!(displayed(Vec3::splat(-3.0)), Vec3::ZERO);
@@ -56,6 +76,7 @@ mod tests {
             );
             last = shown;
         }
-        assert!(last > 0.999_999, "{last}");
+        // The fit ends 2.2e-4 below white.
+        assert!(last > 0.9997, "{last}");
     }
 }

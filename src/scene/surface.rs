@@ -65,7 +65,7 @@ pub struct SurfaceSection {
     pub roughness: f32,
     /// Strength of reflections on the wet film.
     pub wetness: f32,
-    /// Multiplies radiance before the tone map.
+    /// Multiplies radiance before the tone curve.
     pub exposure: f32,
     /// `wrap` and `absorption`: the table of wrapped light.
     pub lookup: LookupSection,
