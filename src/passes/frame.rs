@@ -460,7 +460,7 @@ impl FramePasses {
         let inputs = self.surface_inputs(&constants);
         let surface = Surface::new(gpu, &self.knobs, output, &inputs)?;
         let tools_pass = Tools::new(gpu, output)?;
-        let mut timer = Timer::new(gpu, 0);
+        let mut timer = Timer::off();
         let mut encoder = gpu.encoder();
         let depth = &self.targets.depth;
         let level = self.map_level(view);
