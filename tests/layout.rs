@@ -16,6 +16,7 @@ use palpate::passes::moved_leaves::{self, ListedParams, MovedLeaves};
 use palpate::passes::plane_carried::{self, PlaneCarried};
 use palpate::passes::plane_full::{self, PlaneFull};
 use palpate::passes::plane_incremental::{MovedParams, PlaneIncremental, UpdateParams};
+use palpate::passes::plane_stale::{self, PlaneStale};
 use palpate::passes::sampled_fit::Fit;
 use palpate::passes::shadow::Shadow;
 use palpate::passes::surface::Surface;
@@ -31,6 +32,7 @@ fn shaders() -> Vec<(&'static str, &'static [Wgsl])> {
     vec![
         ("normals", Tangents::NORMALS_WGSL),
         ("tangents", Tangents::TANGENTS_WGSL),
+        ("stale planes", PlaneStale::WGSL),
         ("carried planes", PlaneCarried::WGSL),
         ("full planes, sort", PlaneFull::SORT_WGSL),
         ("full planes, fit", PlaneFull::FIT_WGSL),
@@ -170,6 +172,16 @@ fn mirrors() -> Vec<Mirror> {
                 gradient_max_per_m,
                 pad0,
                 pad1
+            }
+        ),
+        mirror!(
+            PlaneStale::WGSL,
+            "Params",
+            plane_stale::Params {
+                point_count,
+                pad0,
+                pad1,
+                pad2
             }
         ),
         mirror!(

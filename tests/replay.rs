@@ -407,6 +407,19 @@ fn each_light_path_method_makes_the_planes_that_it_promises() {
         angle_p999(&stale_normals, &rest_normals) <= DEGREES_MAX,
         "stale is of the rest"
     );
+    // How far a plane has gone along its normal since rest.
+    let gone_m = |planes: &[(DVec3, f64)], point: usize| {
+        let (normal, offset_m) = planes[point];
+        let way = dump.now.points[point] - dump.rest.points[point];
+        (normal.dot(way) + offset_m - at_rest[point].1).abs()
+    };
+    let stale_m = percentile(all.iter().map(|&p| gone_m(&stale, p)), 0.999);
+    assert!(stale_m < 0.01 * deepest, "stale planes went {stale_m} m");
+    let carried_m = percentile(pressed.iter().map(|&p| gone_m(&carried, p)), 0.5);
+    assert!(
+        carried_m > 0.1 * deepest,
+        "carried planes stayed where they were"
+    );
     assert!(
         tangent.iter().all(|plane| plane.1 == 0.0),
         "the tangent plane lies at its point"

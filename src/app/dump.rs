@@ -85,6 +85,10 @@ pub fn write_dump(folder: &Path, session: &Session, renderer: &Renderer) -> Resu
 
 const FITTED: &str = "plane { x : normal . (x - position) = offset_m }: least squares over the patch, \
                       oriented with the normal";
+const STALE: &str = "plane { x : normal . (x - position) = offset_m }: least squares over the patch at rest, left where it \
+                     was in space";
+const CARRIED: &str = "plane { x : normal . (x - position) = offset_m }: least squares over the patch at rest, moved with the \
+                       point and turned with its tangent frame";
 const TANGENT: &str = "plane { x : normal . (x - position) = 0 }: the tangent plane; the shaders of this \
                        scene read no fitted one";
 
@@ -104,7 +108,14 @@ fn description(session: &Session, renderer: &Renderer, fitted: bool) -> serde_js
         up: orbit.up,
         fov_y: orbit.fov_y,
     };
-    let quadric = effective_method(scene) == Some(LightPathMethod::Quadric);
+    let method = effective_method(scene);
+    let meaning = match method {
+        Some(LightPathMethod::Quadric) => QUADRIC,
+        Some(LightPathMethod::Stale) => STALE,
+        Some(LightPathMethod::Carried) => CARRIED,
+        _ if fitted => FITTED,
+        _ => TANGENT,
+    };
     let [width, height] = renderer.size();
     let aspect = width as f32 / height as f32;
     let lights: Vec<_> = placed_lights(scene, &session.rest)
@@ -140,12 +151,12 @@ fn description(session: &Session, renderer: &Renderer, fitted: bool) -> serde_js
         "surface": scene.surface,
         "layers": scene.surface.layers,
         "light_path": {
-            "method": effective_method(scene).map_or("none", LightPathMethod::name),
+            "method": method.map_or("none", LightPathMethod::name),
             "radius_m": fitted.then(|| patch_radius_m(scene)),
         },
         "primitives": {
-            "columns": if quadric { &QUADRIC_COLUMNS[..] } else { &PLANE_COLUMNS[..] },
-            "meaning": if quadric { QUADRIC } else if fitted { FITTED } else { TANGENT },
+            "columns": if meaning == QUADRIC { &QUADRIC_COLUMNS[..] } else { &PLANE_COLUMNS[..] },
+            "meaning": meaning,
             "patch": "the points within radius_m of the point in rest_positions whose rest normals are not opposed (dot > 0), at least the 16 nearest; membership is symmetric; each point counts once though it may have several vertices (point_of)",
         },
         "arrays": {

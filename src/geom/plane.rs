@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 pub enum LightPathMethod {
     /// The tangent plane; nothing is fitted.
     Tangent,
-    /// Planes fitted at rest and left as they were, anchored at the moved point.
+    /// Planes fitted at rest and left where they were in space: precomputed ones.
     Stale,
     /// Planes fitted at rest and turned with the tangent frame.
     Carried,
@@ -280,6 +280,16 @@ pub fn fit_planes(points: &[Vec3], normals: &[Vec3], patches: &Patches) -> Vec<P
             fit_plane(members, points[point], normals[point])
         })
         .collect()
+}
+
+/// A plane of `rest` that is left where it was in space while its point moves from `rest_place` to `place` [m].
+///
+/// Twin of `shaders/plane_stale.wgsl`.
+pub fn stale_plane(rest: Plane, rest_place: Vec3, place: Vec3) -> Plane {
+    Plane {
+        normal: rest.normal,
+        offset_m: rest.offset_m - rest.normal.dot(place - rest_place),
+    }
 }
 
 /// A plane `carried` by the tangent frame of its point: its normal in (tangent, bitangent, normal).

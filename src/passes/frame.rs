@@ -16,6 +16,7 @@ use super::mesh_buffers::MeshBuffers;
 use super::plane_carried::PlaneCarried;
 use super::plane_full::PlaneFull;
 use super::plane_incremental::PlaneIncremental;
+use super::plane_stale::PlaneStale;
 use super::sampled_fit::Fit;
 use super::shadow::Shadow;
 use super::surface::{Surface, SurfaceInputs};
@@ -61,6 +62,7 @@ impl FramePlan {
         let diffuse = 2 * Diffusion::blurred_gaussians(&scene.surface).len() as u32;
         let all = [
             (Tangents::NAME, 2, true),
+            (PlaneStale::NAME, 1, method == Some(LightPathMethod::Stale)),
             (
                 PlaneCarried::NAME,
                 1,

@@ -5,14 +5,15 @@ use super::moved_leaves::SampledPatches;
 use super::plane_carried::PlaneCarried;
 use super::plane_full::PlaneFull;
 use super::plane_incremental::PlaneIncremental;
+use super::plane_stale::PlaneStale;
 use super::sampled_fit::{Fit, SampledFit};
 use super::tangents::Tangents;
 use crate::geom::SurfaceMesh;
 use crate::geom::patch::Patches;
-use crate::geom::plane::{LightPathMethod, Plane, fit_planes};
+use crate::geom::plane::{LightPathMethod, fit_planes};
 use crate::geom::sample::Samples;
 use crate::geom::tangent::{Fans, rest_normals};
-use crate::gpu::{Gpu, GpuError, Timer, storage};
+use crate::gpu::{Gpu, GpuError, Timer};
 
 /// How much of a frame's planes had to be made anew.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,8 +30,8 @@ pub enum LightPath {
     Tangent,
     /// Nothing here: the depth maps of the lights are drawn with the shadows ([`super::depth_maps`]).
     DepthMap,
-    /// The planes at rest, uploaded once.
-    Stale(wgpu::Buffer),
+    /// The planes at rest, where they were in space.
+    Stale(PlaneStale),
     /// The planes at rest, turned.
     Carried(PlaneCarried),
     /// All planes anew.
@@ -138,11 +139,8 @@ impl LightPath {
             LightPathMethod::Tangent => Self::Tangent,
             LightPathMethod::DepthMap => Self::DepthMap,
             LightPathMethod::Stale => {
-                let planes: Vec<[f32; 4]> = fit_planes(&mesh.points, &normals, &patches)
-                    .into_iter()
-                    .map(Plane::to_array)
-                    .collect();
-                Self::Stale(storage(gpu, "planes", &planes)?)
+                let planes = fit_planes(&mesh.points, &normals, &patches);
+                Self::Stale(PlaneStale::new(gpu, &mesh.points, &planes, buffers)?)
             }
             LightPathMethod::Carried => {
                 let planes = fit_planes(&mesh.points, &normals, &patches);
@@ -184,7 +182,8 @@ impl LightPath {
     /// Adds this frame's passes to `encoder`, after the tangents.
     pub fn record(&self, encoder: &mut wgpu::CommandEncoder, timer: &mut Timer) {
         match self {
-            Self::Tangent | Self::DepthMap | Self::Stale(_) => {}
+            Self::Tangent | Self::DepthMap => {}
+            Self::Stale(pass) => pass.record(encoder, timer),
             Self::Carried(pass) => pass.record(encoder, timer),
             Self::Full(pass) => pass.record(encoder, timer),
             Self::Incremental(pass) => pass.record(encoder, timer),
@@ -197,7 +196,7 @@ impl LightPath {
         match self {
             Self::Tangent => Primitives::Tangent,
             Self::DepthMap => Primitives::DepthMaps,
-            Self::Stale(planes) => Primitives::Planes(planes),
+            Self::Stale(pass) => Primitives::Planes(&pass.planes),
             Self::Carried(pass) => Primitives::Planes(&pass.planes),
             Self::Full(pass) => Primitives::Planes(&pass.planes),
             Self::Incremental(pass) => Primitives::Planes(&pass.planes),
@@ -219,7 +218,8 @@ impl LightPath {
     /// Names of the passes it records, as the timer knows them.
     pub fn pass_names(&self) -> &'static [&'static str] {
         match self {
-            Self::Tangent | Self::DepthMap | Self::Stale(_) => &[],
+            Self::Tangent | Self::DepthMap => &[],
+            Self::Stale(_) => &[PlaneStale::NAME],
             Self::Carried(_) => &[PlaneCarried::NAME],
             Self::Full(_) => &[PlaneFull::NAME],
             Self::Incremental(_) => &[PlaneIncremental::NAME],

@@ -17,6 +17,7 @@ pub mod moved_leaves;
 pub mod plane_carried;
 pub mod plane_full;
 pub mod plane_incremental;
+pub mod plane_stale;
 pub mod sampled_fit;
 pub mod shadow;
 pub mod surface;

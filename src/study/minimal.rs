@@ -13,7 +13,7 @@ use crate::measure::chart::three_digits;
 use crate::measure::page::{Block, Table};
 use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
 use crate::measure::stats::Stats;
-use crate::scene::{Scene, SurfaceKind, UvMetric};
+use crate::scene::{InnerLight, InnerTaps, Noise, Scene, SurfaceKind, UvMetric};
 use glam::Vec3;
 use image::RgbaImage;
 use serde::{Deserialize, Serialize};
@@ -26,6 +26,8 @@ const NOTHING: f64 = 0.0013;
 const NO_COST_SHARE: f64 = 0.03;
 /// A channel that differs by so many levels is seen.
 const SEEN_LEVELS: u8 = 3;
+/// The shadow between layers that a scene without one is given: that of the scene `heart`.
+const LAYER_SHADOW: f32 = 0.3;
 /// Frames before those that are timed.
 const WARM_UP: u32 = 2;
 const CHART_PX: (f64, f64) = (620.0, 400.0);
@@ -38,6 +40,8 @@ const MS_RANGE: (f64, f64) = (0.01, 100.0);
 pub enum Feature {
     /// The shadow of the key light.
     Shadow,
+    /// All lights but the first.
+    FillLights,
     /// The scene's light-path primitive, or the tangent plane.
     LightPath,
     /// Texture coordinates by the metric of the deformed surface.
@@ -56,15 +60,24 @@ pub enum Feature {
     Wetness,
     /// Twice the samples.
     MoreSamples,
+    /// What moves the places where the layers are read.
+    Noise,
+    /// The light map of the inner layers, or light on the smooth normal.
+    LightMap,
     /// The blur of the light map.
     Blur,
+    /// The blur of the inner layers' colour.
+    InnerBlur,
+    /// What an opaque layer keeps from those below.
+    LayerShadow,
     /// The opacity map over the inner layer.
     Parallax,
 }
 
 impl Feature {
-    const ALL: [Self; 12] = [
+    const ALL: [Self; 17] = [
         Self::Shadow,
+        Self::FillLights,
         Self::LightPath,
         Self::UvMetric,
         Self::LayerVolume,
@@ -74,13 +87,18 @@ impl Feature {
         Self::Relief,
         Self::Wetness,
         Self::MoreSamples,
+        Self::Noise,
+        Self::LightMap,
         Self::Blur,
+        Self::InnerBlur,
+        Self::LayerShadow,
         Self::Parallax,
     ];
 
     fn name(self) -> &'static str {
         match self {
             Self::Shadow => "shadow",
+            Self::FillLights => "fill-lights",
             Self::LightPath => "light-path",
             Self::UvMetric => "uv-metric",
             Self::LayerVolume => "layer-volume",
@@ -90,7 +108,11 @@ impl Feature {
             Self::Relief => "relief",
             Self::Wetness => "wetness",
             Self::MoreSamples => "more-samples",
+            Self::Noise => "noise",
+            Self::LightMap => "light-map",
             Self::Blur => "blur",
+            Self::InnerBlur => "inner-blur",
+            Self::LayerShadow => "layer-shadow",
             Self::Parallax => "parallax",
         }
     }
@@ -104,6 +126,7 @@ impl Feature {
         let if_has = |has: bool, on: bool| has.then_some(on);
         match self {
             Self::Shadow => Some(scene.lights.iter().any(|light| light.shadow)),
+            Self::FillLights => if_has(scene.lights.len() > 1, true),
             Self::LightPath => if_has(layered, scene.light_path.method != LightPathMethod::Tangent),
             Self::UvMetric => if_has(below, surface.uv_metric == UvMetric::Deformed),
             Self::LayerVolume => if_has(below, surface.thickness_follows_volume),
@@ -113,7 +136,11 @@ impl Feature {
             Self::Relief => Some(surface.relief > 0.0),
             Self::Wetness => Some(surface.wetness > 0.0),
             Self::MoreSamples => if_has(layered, false),
-            Self::Blur => if_has(gooey, surface.blur_passes > 0),
+            Self::Noise => if_has(layered, surface.noise != Noise::None),
+            Self::LightMap => if_has(gooey, surface.has_light_map()),
+            Self::Blur => if_has(surface.has_light_map(), surface.blur_passes > 0),
+            Self::InnerBlur => if_has(gooey, surface.inner_taps != InnerTaps::One),
+            Self::LayerShadow => if_has(gooey, surface.layer_shadow > 0.0),
             Self::Parallax => if_has(gooey, surface.layer_distance_m > 0.0),
         }
     }
@@ -132,6 +159,7 @@ impl Feature {
                     light.shadow = !is_on && index == 0 && light.toward.is_some();
                 }
             }
+            Self::FillLights => scene.lights.truncate(1),
             Self::LightPath => {
                 scene.light_path.method = if is_on {
                     LightPathMethod::Tangent
@@ -158,6 +186,24 @@ impl Feature {
             Self::Relief => knob(&mut surface.relief, standard.relief),
             Self::Wetness => knob(&mut surface.wetness, standard.wetness),
             Self::MoreSamples => surface.samples *= 2,
+            Self::Noise => {
+                surface.noise = if is_on { Noise::None } else { Noise::Gradient };
+            }
+            Self::LightMap => {
+                surface.inner_light = if is_on {
+                    InnerLight::SmoothNormal
+                } else {
+                    InnerLight::Map
+                };
+            }
+            Self::InnerBlur => {
+                surface.inner_taps = if is_on {
+                    InnerTaps::One
+                } else {
+                    InnerTaps::Three
+                };
+            }
+            Self::LayerShadow => knob(&mut surface.layer_shadow, LAYER_SHADOW),
             Self::Blur => {
                 surface.blur_passes = if is_on { 0 } else { standard.blur_passes };
             }
@@ -543,7 +589,7 @@ mod tests {
 
     #[test]
     fn a_feature_toggled_twice_is_as_before_and_once_is_not() {
-        for name in ["spleen", "liver-gooey"] {
+        for name in ["spleen", "liver-gooey", "heart"] {
             let scene = load_scene(name, &[]).expect("it is bundled");
             for feature in Feature::ALL {
                 let Some(on) = feature.is_on(&scene) else {
@@ -551,7 +597,8 @@ mod tests {
                 };
                 let once = feature.toggled(&scene);
                 assert_ne!(once, scene, "{name}: {feature:?}");
-                if feature != Feature::MoreSamples {
+                // Twice is more, and lights that are gone are not made up.
+                if !matches!(feature, Feature::MoreSamples | Feature::FillLights) {
                     assert_eq!(feature.is_on(&once), Some(!on), "{name}: {feature:?}");
                     assert_eq!(feature.is_on(&feature.toggled(&once)), Some(on));
                 }

@@ -4,7 +4,7 @@
 //! between its planes and the f64 fit of the same frame. Of `quadric` the angle is that of the surface's normal at the
 //! rim of the patch, against the f64 fit of the same samples. `drift` moves all alike, `poke` the points nearest to one
 //! place, `scattered` as many all over, which is the worst case for a method that skips what is
-//! still. `stale` and `tangent` have no pass; their errors say what that saves.
+//! still. `tangent` has no pass; its errors say what that saves.
 
 #[allow(dead_code, reason = "one of the shared surfaces is enough here")]
 #[path = "../support/surfaces.rs"]

@@ -90,15 +90,15 @@ impl Drawn {
         primitives_are && self.normals.iter().all(|normal| normal.is_finite())
     }
 
-    /// The same with every plane left where it was in space when its point moved from `rest` to `now` [m].
-    pub fn left_in_place(&self, rest: &[Vec3], now: &[Vec3]) -> Self {
-        let mut left = self.clone();
-        if let DrawnPrimitives::Planes(planes) = &mut left.primitives {
+    /// The same with every plane, left where it was in space, moved along with its point from `rest` to `now` [m], unturned.
+    pub fn moved_along(&self, rest: &[Vec3], now: &[Vec3]) -> Self {
+        let mut moved = self.clone();
+        if let DrawnPrimitives::Planes(planes) = &mut moved.primitives {
             for (plane, (rest, now)) in planes.iter_mut().zip(rest.iter().zip(now)) {
-                plane.w += plane.truncate().dot(*rest - *now);
+                plane.w += plane.truncate().dot(*now - *rest);
             }
         }
-        left
+        moved
     }
 
     /// Whether its ways know of every shadow; with the others the place itself is asked.
@@ -422,10 +422,10 @@ mod tests {
 
         let rest = &body.mesh.points;
         let moved: Vec<Vec3> = rest.iter().map(|p| *p + 0.01 * Vec3::Z).collect();
-        let shifted = turned(0.0).left_in_place(rest, &moved);
+        let shifted = turned(0.0).moved_along(rest, &moved);
         assert!(error(&shifted, published) > 1.5 * none);
         assert_eq!(
-            error(&turned(0.0).left_in_place(rest, rest), published),
+            error(&turned(0.0).moved_along(rest, rest), published),
             error(&turned(0.0), published)
         );
     }

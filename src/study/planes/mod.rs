@@ -150,10 +150,10 @@ pub struct Measures {
     pub radiance_error_with_shadows_rel: Option<f64>,
     /// With planes blended as published, by the first power of the way.
     pub radiance_error_published_rel: Option<f64>,
-    /// Of stale planes that stay where they were in space instead of moving along with their points, blended as
-    /// published: everywhere, and where the body is poked.
-    pub radiance_error_in_place_rel: Option<f64>,
-    pub radiance_error_in_place_poked_rel: Option<f64>,
+    /// Of stale planes if they moved along with their points and turned with nothing: everywhere, and where the
+    /// body is poked. What is left of their error is that they do not turn.
+    pub radiance_error_unturned_rel: Option<f64>,
+    pub radiance_error_unturned_poked_rel: Option<f64>,
     pub oracle: String,
 }
 

@@ -1,6 +1,5 @@
 //! One picture: a bundled organ in the middle of its script, poked, as each method lights it, beside the truth by
-//! rays, and how far off each pixel is. Planes left in place are those of the rest pose, where they were in space, blended
-//! as published.
+//! rays, and how far off each pixel is.
 
 use super::body::Body;
 use super::estimate::{Blend, Drawn};
@@ -65,20 +64,13 @@ pub fn write(bench: &Bench, side: u32, out: &Path) -> Result<(), AppError> {
     for method in METHODS {
         let lights = [[view.to_light; 3]];
         let drawn = bench.drawn(&body, method, radius_m, &points, &lights)?;
-        let mut add = |name: &str, drawn: &Drawn, blend: Blend| {
-            let lit = all_by(bench.threads(), &sights, |sight| {
-                sight
-                    .as_ref()
-                    .map_or(DVec3::ZERO, |sight| view.estimate(sight, drawn, blend))
-            });
-            let error = relative_error(&lit, &truth);
-            panels.push((format!("{name} {:.1}%", 100.0 * error), lit));
-        };
-        if method == LightPathMethod::Stale {
-            let left = drawn.left_in_place(&body.mesh.points, &points);
-            add("left in place", &left, Blend::Published);
-        }
-        add(method.name(), &drawn, Blend::Squared);
+        let lit = all_by(bench.threads(), &sights, |sight| {
+            sight
+                .as_ref()
+                .map_or(DVec3::ZERO, |sight| view.estimate(sight, &drawn))
+        });
+        let error = relative_error(&lit, &truth);
+        panels.push((format!("{} {:.1}%", method.name(), 100.0 * error), lit));
     }
     let picture = sheet(&panels, side);
     Ok(files::write_png(&out.join("planes.png"), &picture)?)
@@ -184,13 +176,13 @@ impl View {
             .sum()
     }
 
-    fn estimate(&self, sight: &Sight, drawn: &Drawn, blend: Blend) -> DVec3 {
+    fn estimate(&self, sight: &Sight, drawn: &Drawn) -> DVec3 {
         let cover = drawn.cover(sight);
         // As the product draws it: one look at the shadow of the point, unless the ways see shadows themselves.
         if sight.is_shaded[0] && !drawn.sees_shadows() {
             return DVec3::ZERO;
         }
-        self.radiance(sight, |_, t| cover.way_m(sight, 0, t, blend))
+        self.radiance(sight, |_, t| cover.way_m(sight, 0, t, Blend::Squared))
     }
 }
 

@@ -8,6 +8,7 @@ use crate::geom::plane::LightPathMethod;
 use crate::measure::chart::{number, three_digits};
 use crate::measure::page::{Block, Table};
 use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
+use crate::measure::stats::Stats;
 
 type PlanesRow = Row<Cell, Measures>;
 
@@ -15,8 +16,8 @@ const CHART_PX: (f64, f64) = (470.0, 340.0);
 const COLUMNS: usize = 2;
 /// What the charts show of the cost [ms].
 const MS_RANGE: (f64, f64) = (0.003, 200.0);
-/// Where methods without a pass stand [ms], each beside the other.
-const NO_PASS_MS: [f64; 3] = [0.004, 0.0065, 0.0105];
+/// Where a method without a pass stands [ms].
+const NO_PASS_MS: f64 = 0.004;
 /// What the charts show of the error [%].
 const ERROR_RANGE: (f64, f64) = (0.1, 100.0);
 /// The size of mesh that charts show, or what is nearest to it.
@@ -46,8 +47,8 @@ pub fn findings(rows: &[PlanesRow]) -> Findings {
     ));
     blocks.push(Block::Table(errors(&shown)));
     blocks.push(Block::Paragraph(
-        "The same by light, where the body is poked, with planes blended as published, and the error of the way \
-         itself: means over all deformations but rest and ripples, at the third radius or the last."
+        "The same by light, where the body is poked, with planes blended as published, with stale planes \
+         moved along but not turned, and the error of the way itself: means over all deformations but rest and ripples, at the third radius or the last."
             .to_owned(),
     ));
     blocks.push(Block::Table(kinds(&shown)));
@@ -154,55 +155,78 @@ fn share_name(share: f64) -> String {
     format!("{} %", number(100.0 * share))
 }
 
-/// A chart a deformation: its title and itself.
+/// A chart of all deformations together and one of each: title and itself.
 fn charts(rows: &[&PlanesRow]) -> Vec<(String, String)> {
     let deformations = distinct(rows.iter().map(|row| row.cell.deformation));
-    deformations
-        .into_iter()
-        .map(|deformation| {
-            let mut clouds: Vec<Cloud> = LightPathMethod::ALL
-                .into_iter()
-                .enumerate()
-                .filter(|(_, method)| methods(rows).contains(method))
-                .map(|(look, method)| Cloud {
-                    label: method.name().to_owned(),
-                    look,
-                    hollow: false,
-                    joined: true,
-                    points: points(rows, method, deformation, |m| m.radiance_error_rel, {
-                        NO_PASS_MS[usize::from(method == LightPathMethod::Stale)]
-                    }),
-                })
-                .collect();
-            let stale = LightPathMethod::Stale;
-            let left = points(
-                rows,
-                stale,
-                deformation,
-                |m| m.radiance_error_in_place_rel,
-                NO_PASS_MS[2],
-            );
-            if !left.is_empty() {
-                clouds.push(Cloud {
-                    label: "stale, left in place".to_owned(),
-                    look: LightPathMethod::ALL.len(),
-                    hollow: true,
-                    joined: true,
-                    points: left,
-                });
-            }
-            let chart = ScatterChart {
-                size_px: CHART_PX,
-                title: format!("{}; {}", deformation.name(), sizes(rows)),
-                x_label: "GPU time of the refit [ms]; left of 0.02: no pass".to_owned(),
-                y_label: "error of radiance [%]".to_owned(),
-                x_range: MS_RANGE,
-                y_range: ERROR_RANGE,
-                clouds,
-            };
-            (deformation.name().to_owned(), chart.svg())
+    let together = chart(rows, "moved, mean of all but ripples", |method, radius| {
+        Some((
+            median_ms(rows, method, radius),
+            mean(rows, method, radius, |m| m.radiance_error_rel)?,
+        ))
+    });
+    let each = deformations.into_iter().map(|deformation| {
+        chart(rows, deformation.name(), |method, radius| {
+            let measures = &row_of(rows, method, deformation, radius)?.measures;
+            Some((measures.refit_ms_p50, measures.radiance_error_rel?))
         })
-        .collect()
+    });
+    std::iter::once(together).chain(each).collect()
+}
+
+/// Cost [ms], if there is a pass, and error of radiance by `of`, a method and a radius: a point a radius, the larger the
+/// farther the patches reach.
+fn chart(
+    rows: &[&PlanesRow],
+    title: &str,
+    of: impl Fn(LightPathMethod, f64) -> Option<(Option<f64>, f64)>,
+) -> (String, String) {
+    let radii = radii(rows);
+    let points = |method| -> Vec<Point> {
+        let indexed = radii.iter().enumerate();
+        indexed
+            .filter_map(|(index, &radius)| {
+                let (ms, error) = of(method, radius)?;
+                Some(Point {
+                    x: ms.unwrap_or(0.0).max(NO_PASS_MS),
+                    y: Some(100.0 * error),
+                    label: String::new(),
+                    scale: 0.6 + 0.2 * index as f64,
+                })
+            })
+            .collect()
+    };
+    let chart = ScatterChart {
+        size_px: CHART_PX,
+        title: format!("{title}; {}", sizes(rows)),
+        x_label: format!("GPU time of the refit [ms]; at {NO_PASS_MS}: no pass"),
+        y_label: "error of radiance [%]".to_owned(),
+        x_range: MS_RANGE,
+        y_range: ERROR_RANGE,
+        clouds: LightPathMethod::ALL
+            .into_iter()
+            .enumerate()
+            .filter(|(_, method)| methods(rows).contains(method))
+            .map(|(look, method)| Cloud {
+                label: method.name().to_owned(),
+                look,
+                hollow: false,
+                joined: true,
+                points: points(method),
+            })
+            .collect(),
+    };
+    (title.to_owned(), chart.svg())
+}
+
+/// Time of a method's pass [ms] in the middle of the deformations that [`mean`] is over: a single one may have been
+/// measured in a busy moment.
+fn median_ms(rows: &[&PlanesRow], method: LightPathMethod, radius: f64) -> Option<f64> {
+    let times = moved().filter_map(|deformation| {
+        row_of(rows, method, deformation, radius)?
+            .measures
+            .refit_ms_p50
+    });
+    Some(Stats::of(times.map(|ms| ms as f32))?.p50)
 }
 
 /// What the sizes of the markers mean.
@@ -212,33 +236,6 @@ fn sizes(rows: &[&PlanesRow]) -> String {
         "markers from small to large: radius of {} %",
         radii.join(", ")
     )
-}
-
-/// A point a radius for what `measure` is known of, the larger the farther the patches reach; one without a pass stands
-/// at `no_pass_ms`.
-fn points(
-    rows: &[&PlanesRow],
-    method: LightPathMethod,
-    deformation: Deformation,
-    measure: impl Fn(&Measures) -> Option<f64>,
-    no_pass_ms: f64,
-) -> Vec<Point> {
-    radii(rows)
-        .into_iter()
-        .enumerate()
-        .filter_map(|(index, radius)| {
-            let row = row_of(rows, method, deformation, radius)?;
-            Some(Point {
-                x: match row.measures.refit_ms_p50 {
-                    Some(ms) if ms > 0.0 => ms.max(no_pass_ms),
-                    _ => no_pass_ms,
-                },
-                y: Some(100.0 * measure(&row.measures)?),
-                label: String::new(),
-                scale: 0.6 + 0.2 * index as f64,
-            })
-        })
-        .collect()
 }
 
 fn errors(rows: &[&PlanesRow]) -> Table {
@@ -259,16 +256,20 @@ fn errors(rows: &[&PlanesRow]) -> Table {
     Table { head, rows: lines }
 }
 
-/// Mean of a measure over the deformations that a single primitive can follow.
+/// The deformations that a single primitive can follow.
+fn moved() -> impl Iterator<Item = Deformation> {
+    let follows = |d: &Deformation| !matches!(d, Deformation::Rest | Deformation::Ripple);
+    Deformation::ALL.into_iter().filter(follows)
+}
+
+/// Mean of a measure over [`moved`].
 fn mean(
     rows: &[&PlanesRow],
     method: LightPathMethod,
     radius: f64,
     measure: impl Fn(&Measures) -> Option<f64>,
 ) -> Option<f64> {
-    let values: Vec<f64> = Deformation::ALL
-        .into_iter()
-        .filter(|d| !matches!(d, Deformation::Rest | Deformation::Ripple))
+    let values: Vec<f64> = moved()
         .filter_map(|deformation| measure(&row_of(rows, method, deformation, radius)?.measures))
         .collect();
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
@@ -298,7 +299,7 @@ fn kinds(rows: &[&PlanesRow]) -> Table {
         "poked part",
         "with shadows",
         "published",
-        "left in place",
+        "moved along",
         "‖KM‖",
     ];
     let lines = methods(rows).into_iter().map(|method| {
@@ -314,7 +315,7 @@ fn kinds(rows: &[&PlanesRow]) -> Table {
             percent(poke(method, |m| m.radiance_error_poked_rel)),
             of(|m| m.radiance_error_with_shadows_rel),
             of(|m| m.radiance_error_published_rel),
-            of(|m| m.radiance_error_in_place_rel),
+            of(|m| m.radiance_error_unturned_rel),
             of(|m| m.km_error_rel),
         ]
     });
@@ -372,12 +373,7 @@ fn costs(rows: &[PlanesRow]) -> Table {
             told(measures.kernel_error_deg_p999),
         ]
     };
-    let has_pass = |row: &&&PlanesRow| {
-        !matches!(
-            row.cell.method,
-            LightPathMethod::Tangent | LightPathMethod::Stale
-        )
-    };
+    let has_pass = |row: &&&PlanesRow| row.cell.method != LightPathMethod::Tangent;
     Table {
         head: head.map(str::to_owned).to_vec(),
         rows: poked.iter().filter(has_pass).map(line).collect(),
@@ -505,8 +501,8 @@ mod tests {
                 radiance_error_poked_rel: Some(error),
                 radiance_error_with_shadows_rel: None,
                 radiance_error_published_rel: None,
-                radiance_error_in_place_rel: None,
-                radiance_error_in_place_poked_rel: None,
+                radiance_error_unturned_rel: None,
+                radiance_error_unturned_poked_rel: None,
                 oracle: String::new(),
             },
             cost: Cost::default(),
@@ -517,14 +513,15 @@ mod tests {
     #[test]
     fn findings_rank_methods_by_their_error_and_tell_cost_as_a_share_of_full() {
         let rows = [
-            row(LightPathMethod::Stale, Deformation::Poke, 0.0, 0.4),
+            row(LightPathMethod::Tangent, Deformation::Poke, 0.0, 0.2),
+            row(LightPathMethod::Stale, Deformation::Poke, 0.02, 0.4),
             row(LightPathMethod::Full, Deformation::Poke, 4.0, 0.1),
             row(LightPathMethod::Incremental, Deformation::Poke, 1.0, 0.11),
         ];
         let findings = findings(&rows);
         let text = findings.text().replace('\n', " ");
         assert!(
-            text.contains("full 10.0 %, incremental 11.0 %, stale 40.0 %"),
+            text.contains("full 10.0 %, incremental 11.0 %, tangent 20.0 %, stale 40.0 %"),
             "{text}"
         );
         assert!(
@@ -532,11 +529,11 @@ mod tests {
             "{text}"
         );
         let costs = costs(&rows);
-        assert_eq!(costs.rows.len(), 2, "stale planes have no pass");
-        assert_eq!(costs.rows[1][9], "25.0");
-        assert_eq!(findings.svg.matches("error of radiance").count(), 1);
+        assert_eq!(costs.rows.len(), 3, "tangent planes have no pass");
+        assert_eq!(costs.rows[2][9], "25.0");
+        assert_eq!(findings.svg.matches("error of radiance").count(), 2);
         assert!(
-            findings.svg.contains("stale"),
+            findings.svg.contains("tangent"),
             "a method without a pass is shown"
         );
     }
