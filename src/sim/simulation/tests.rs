@@ -1,5 +1,6 @@
 //! The whole step: rest, sag, contact, grab, and what must not depend on threads.
 
+mod beat;
 mod contact;
 mod grab;
 mod hard_pressed;
@@ -31,6 +32,7 @@ fn setup(surface: &SurfaceMesh, lattice: Lattice, fixed: impl Fn(Vec3) -> bool) 
         fixed: lattice.tets.particles.iter().map(|&x| fixed(x)).collect(),
         masses_kg: lattice.masses_kg,
         fill: lattice.fill,
+        activity: Vec::new(),
         triangles: surface.point_triangles(),
         embedding: lattice.embedding,
         tets: lattice.tets,
