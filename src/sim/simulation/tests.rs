@@ -1,6 +1,5 @@
 //! The whole step: rest, sag, contact, grab, and what must not depend on threads.
 
-mod beat;
 mod contact;
 mod grab;
 mod hard_pressed;
