@@ -4,7 +4,7 @@
 CARGO ?= cargo
 export XDG_RUNTIME_DIR ?= /tmp
 
-.PHONY: run test setup bench
+.PHONY: run test setup bench gallery
 
 run: setup
 	$(CARGO) build --release
@@ -19,6 +19,10 @@ test: setup
 
 bench: setup
 	$(CARGO) bench
+
+# Draws docs/GALLERY.md and its pictures anew, and records what each technique changes.
+gallery: setup
+	PALPATE_ACCEPT=1 $(CARGO) test --test gallery
 
 setup:
 	@sh tests/setup.sh

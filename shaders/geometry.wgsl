@@ -7,7 +7,8 @@
 //
 // Gradients and bends [1/m] are along the tangent and the bitangent: (ds, dt) = (d.t u_t + d.b u_b, ...), and
 // z = 1/2 (a t^2 + 2 b t b + c b^2). Thickness is that of a layer now over that at rest: tissue keeps its volume, so it is
-// the area at rest over that now, |g_u x g_v| now over that at rest.
+// the area at rest over that now, |g_u x g_v| now over that at rest; times the volume that muscle wants, in the fourth
+// number of a position.
 //
 // Source:  do Carmo, "Differential Geometry of Curves and Surfaces" (1976), 2.5, for the area; Cigolla et al., "A Survey of Efficient Representations for Independent Unit Vectors", JCGT 2014.
 // Twin:    src/optics/pack.rs, fn octahedral
@@ -101,7 +102,7 @@ fn geometry_vertex(
     );
     var thickness = 1.0;
     if FOLLOWS_VOLUME != 0u {
-        thickness = thickness_of(gradients, rest_gradients[vertex]);
+        thickness = positions[point].w * thickness_of(gradients, rest_gradients[vertex]);
     }
     if UNIT_FRAMES != 0u {
         gradients = rest_gradients[vertex];

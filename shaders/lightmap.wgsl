@@ -60,7 +60,7 @@ fn lightmap_vertex(@builtin(vertex_index) vertex: u32) -> Varyings {
     var here = metric(gradients[0].xyz, gradients[1].xyz);
     var thickness = 1.0;
     if FOLLOWS_VOLUME != 0u {
-        thickness = thickness_of(here, rest[vertex].yzw);
+        thickness = positions[point].w * thickness_of(here, rest[vertex].yzw);
     }
     if UNIT_FRAMES != 0u {
         here = rest[vertex].yzw;

@@ -216,6 +216,19 @@ fn draw(
     maps: &TissueMaps,
     sets: &[&str],
 ) -> FramePasses {
+    draw_muscle(gpu, mesh, points, 1.0, 1.0, maps, sets)
+}
+
+/// The same from `near` times as far, of muscle that wants to fill `volume` times what it does at rest.
+fn draw_muscle(
+    gpu: &Gpu,
+    mesh: &SurfaceMesh,
+    points: &[Vec3],
+    near: f32,
+    volume: f32,
+    maps: &TissueMaps,
+    sets: &[&str],
+) -> FramePasses {
     let text = "[body]\nshape = \"slab\"\nextent_m = [0.1, 0.1, 0.1]\n[surface]\nkind = \"gooey\"\nwetness = 0.0\n\
                 [[light]]\ntoward = [0.3, 0.0, 1.0]\nirradiance_w_m2 = [3.0, 3.0, 3.0]\n";
     let source = SceneSource {
@@ -227,10 +240,14 @@ fn draw(
     let scene = Scene::read(&source, &sets).expect("a sound scene");
     let (low, high) = palpate::geom::bounds(&mesh.points);
     let rest = RestBox { low, high };
-    let passes = FramePasses::new(gpu, &scene, &rest, mesh, maps, SIZE, Output::Radiance).unwrap();
+    let mut passes =
+        FramePasses::new(gpu, &scene, &rest, mesh, maps, SIZE, Output::Radiance).unwrap();
+    if volume != 1.0 {
+        passes.mesh.set_volumes(&vec![volume; points.len()]);
+    }
     let view = View {
         up: Vec3::Y,
-        eye: Vec3::new(0.1, 0.0, 0.2),
+        eye: near * Vec3::new(0.1, 0.0, 0.2),
         target: Vec3::ZERO,
         fov_y: 0.1,
     };
@@ -373,6 +390,62 @@ fn the_blur_narrows_with_a_layer_that_thins() {
     let width = edge_width_m(&gpu(), 1.5, &sets);
     let error = 1.5 * width / exact_width_m() - 1.0;
     assert!(error.abs() < 0.03, "{error}");
+}
+
+#[test]
+fn what_lies_below_a_clear_layer_is_seen_by_the_cosine_of_the_view() {
+    let gpu = gpu();
+    // Below white lies black: a clear outer layer keeps 1 − N·V of its light.
+    let maps = maps(|_| 255, |_| 0, 0);
+    let light = |opacity: &str| -> f32 {
+        let sets = [&format!("surface.outer_opacity={opacity}")[..]];
+        picture(&gpu, &maps, &sets)
+            .iter()
+            .map(|pixel| pixel.y)
+            .sum()
+    };
+    let left = light("0.0") / light("1.0");
+    let exact = 1.0 - 0.2 / 0.05_f32.sqrt();
+    // The view is a little wide, and texels of 128 lean by 1/255.
+    assert!((left - exact).abs() < 0.01, "{left}, not {exact}");
+}
+
+/// How a level sheet of muscle looks that is `scale` times as large as at rest, from `scale` times as far, when it wants
+/// to fill `volume` times what it did.
+fn shrunk(gpu: &Gpu, scale: f32, volume: f32, sets: &[&str]) -> Vec<Vec4> {
+    let mesh = sheet(8);
+    let points: Vec<Vec3> = mesh.points.iter().map(|&p| scale * p).collect();
+    let all = [&["surface.thickness_follows_volume=true"], sets].concat();
+    let opacity = |x| if (x / 64) % 2 == 0 { 40 } else { 160 };
+    let maps = maps(opacity, stripes, 20);
+    let passes = draw_muscle(gpu, &mesh, &points, scale, volume, &maps, &all);
+    vectors(gpu, &passes.radiance)
+}
+
+#[test]
+fn layers_and_blurs_grow_and_shrink_with_a_beat() {
+    let gpu = gpu();
+    // Parallax alone, then the light map's blur as well.
+    let parallax = [
+        "surface.inner_light=smooth-normal",
+        "surface.inner_taps=disc",
+    ];
+    let blurred = ["surface.layer_shadow=1.0", "surface.blur_radius_m=0.004"];
+    for sets in [&parallax, &blurred] {
+        let rest = shrunk(&gpu, 1.0, 1.0, sets);
+        for scale in [0.8_f32, 1.2] {
+            // All lengths go as the scale, and so all of the picture stays: half floats, and taps that are rounded
+            // to texels.
+            let followed = difference(&rest, &shrunk(&gpu, scale, scale.powi(3), sets));
+            assert!(followed < 0.01, "{scale}: {followed}");
+            // Tissue that keeps the volume that it had instead.
+            let kept = difference(&rest, &shrunk(&gpu, scale, 1.0, sets));
+            assert!(
+                kept > 5.0 * followed.max(0.004),
+                "{scale}: went unnoticed, {kept}"
+            );
+        }
+    }
 }
 
 /// Two squares beside each other in the map, four texels apart, far apart in space; the left one lit, the right one in the

@@ -17,7 +17,7 @@ use std::process::Output;
 const SCENES: [(&str, u32); 10] = [
     ("liver", 44),
     ("liver-gooey", 44),
-    ("heart", 44),
+    ("heart", 66),
     ("kidney", 44),
     ("spleen", 44),
     ("slab", 50),
@@ -125,7 +125,7 @@ fn a_pass_left_out_or_another_tissue_is_found() {
     // The shadow is a pass; without it light falls behind the lobes, and nothing moves otherwise.
     let set = |name: &str, value: &str| {
         let out = folder(name);
-        let mut command = Run::command(&out, &arguments("heart", 44));
+        let mut command = Run::command(&out, &arguments("heart", 66));
         command.args(["--set", value, "--against"]);
         command.arg(recordings().join("heart"));
         let output = command.output().expect("it runs");

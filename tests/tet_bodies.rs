@@ -258,6 +258,7 @@ fn beam_of(scale: f32) -> BodySetup {
         fixed: tets.particles.iter().map(|x| x.x < 1e-9).collect(),
         masses_kg: lumped_masses_kg(&tets, 1000.0),
         fill: Vec::new(),
+        activity: Vec::new(),
         embedding: Embedding {
             particles: block.embedding.particles,
             weights: block.embedding.weights,

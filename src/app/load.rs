@@ -132,6 +132,7 @@ pub fn body(scene: &Scene) -> Result<LoadedBody, AppError> {
         .iter()
         .map(|&x| section.fixed.iter().any(|region| region.contains(x, &rest)))
         .collect();
+    let activity = activity(section, &tissue.tets.particles, &rest)?;
     if fixed.iter().all(|&held| held) {
         return Err(AppError::Body(
             "body.fixed holds every particle, so nothing can move: make the regions smaller"
@@ -143,6 +144,7 @@ pub fn body(scene: &Scene) -> Result<LoadedBody, AppError> {
         masses_kg: tissue.masses_kg,
         fixed,
         fill: tissue.fill,
+        activity,
         embedding: tissue.embedding,
         triangles: mesh.point_triangles(),
         gravity_m_s2: section.gravity_m_s2,
@@ -154,6 +156,29 @@ pub fn body(scene: &Scene) -> Result<LoadedBody, AppError> {
         setup: setup.numbered_along(),
         notes,
     })
+}
+
+/// How much of each particle is muscle; nothing for a body that does not beat, or is muscle throughout.
+fn activity(
+    section: &BodySection,
+    particles: &[Vec3],
+    rest: &RestBox,
+) -> Result<Vec<f32>, AppError> {
+    let regions = section.beat.as_ref().map_or(&[][..], |beat| &beat.muscle);
+    if regions.is_empty() {
+        return Ok(Vec::new());
+    }
+    let is_muscle = |x| regions.iter().any(|region| region.contains(x, rest));
+    let activity: Vec<f32> = (particles.iter())
+        .map(|&x| f32::from(u8::from(is_muscle(x))))
+        .collect();
+    if activity.iter().all(|&share| share == 0.0) {
+        return Err(AppError::Body(
+            "body.beat.muscle reaches no particle, so nothing can beat: make the regions larger"
+                .to_owned(),
+        ));
+    }
+    Ok(activity)
 }
 
 /// The texture maps of a body: its files, or its tissue painted.

@@ -59,6 +59,8 @@ pub enum PanelAsk {
     SurfaceKnobs,
     /// Take over changed knobs of the solver.
     Solver,
+    /// Take over a changed heartbeat.
+    Beat,
     /// Back to rest.
     Reset,
     /// Start a recording of the mouse, or end and save it.
@@ -122,6 +124,7 @@ pub fn show(
                     surface_section(ui, session, asks);
                     light_path_section(ui, state, session, shown.error, asks);
                     solver_section(ui, session, asks);
+                    beat_section(ui, session, asks);
                     hand_section(ui, state, session);
                 });
             });
@@ -422,6 +425,21 @@ fn solver_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAsk>) 
     ui.add(Slider::new(&mut solver.iterations, 1..=10).text("iterations"));
     if *solver != before {
         asks.push(PanelAsk::Solver);
+    }
+}
+
+fn beat_section(ui: &mut Ui, session: &mut Session, asks: &mut Vec<PanelAsk>) {
+    let Some(beat) = &mut session.scene.body.beat else {
+        return;
+    };
+    ui.separator();
+    ui.strong("Heartbeat");
+    let before = beat.clone();
+    ui.checkbox(&mut beat.runs, "beats");
+    ui.add(Slider::new(&mut beat.rate_per_min, 20.0..=180.0).text("beats a minute"));
+    ui.add(Slider::new(&mut beat.strain, 0.0..=0.2).text("shortening"));
+    if *beat != before {
+        asks.push(PanelAsk::Beat);
     }
 }
 

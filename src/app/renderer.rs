@@ -120,7 +120,8 @@ impl Renderer {
             .fitted(width as f32 / height as f32)
     }
 
-    /// Draws one frame and waits for it.
+    /// Draws one frame and waits for it. `volumes` say what the tissue at each point would fill if nothing pressed it,
+    /// over that at rest, where that changes.
     ///
     /// # Errors
     ///
@@ -128,9 +129,13 @@ impl Renderer {
     pub fn draw(
         &mut self,
         points: &[Vec3],
+        volumes: Option<&[f32]>,
         orbit: &Orbit,
         tools: &[DrawnTool],
     ) -> Result<Frame, AppError> {
+        if let Some(volumes) = volumes {
+            self.passes.mesh.set_volumes(volumes);
+        }
         let mut encoder = self.gpu.encoder();
         self.timer.begin_frame();
         let view = View {

@@ -217,7 +217,12 @@ impl Run {
             return Ok(Frame::default());
         };
         let orbit = renderer.scene_orbit(&self.session);
-        renderer.draw(self.session.points(), &orbit, &self.session.visible_tools())
+        renderer.draw(
+            self.session.points(),
+            self.session.simulation().point_volumes(),
+            &orbit,
+            &self.session.visible_tools(),
+        )
     }
 
     fn picture(&mut self, out: &Path) -> Result<(), AppError> {

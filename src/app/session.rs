@@ -6,7 +6,7 @@ use super::script::Script;
 use crate::geom::SurfaceMesh;
 use crate::geom::ray::nearest_point;
 use crate::passes::tools::DrawnTool;
-use crate::scene::{MarkerSection, RestBox, Scene};
+use crate::scene::{BeatSection, MarkerSection, RestBox, Scene};
 use crate::sim::{Method, Simulation, SolverParams, StepReport, ToolAction, ToolInput, ToolShape};
 use glam::{DVec3, Vec3};
 use sha2::{Digest, Sha256};
@@ -75,6 +75,7 @@ impl Session {
         let mut simulation = Simulation::new(setup, scene.solver);
         simulation.set_threads(Some(threads));
         hand_over_if_stiff(&mut simulation);
+        simulation.set_beat(BeatSection::beat(scene.body.beat.as_ref()));
         let mut notes = notes;
         notes.extend(solver_notes(&scene, &simulation));
         Ok(Self {
@@ -157,6 +158,12 @@ impl Session {
     pub fn set_solver(&mut self) {
         self.simulation.set_params(self.scene.solver);
         hand_over_if_stiff(&mut self.simulation);
+    }
+
+    /// Takes over a changed heartbeat.
+    pub fn set_beat(&mut self) {
+        let section = self.scene.body.beat.as_ref();
+        self.simulation.set_beat(BeatSection::beat(section));
     }
 
     /// Method, material and time step that are taken: the scene's, or `implicit` if its tissue asks for that.

@@ -563,9 +563,10 @@ impl Shown {
         self.take_light_error();
         let (jobs, pixels_per_point) = self.panel()?;
         let tools = self.session.visible_tools();
+        let volumes = self.session.simulation().point_volumes();
         let drawn = self
             .renderer
-            .draw(self.session.points(), &self.orbit, &tools)?;
+            .draw(self.session.points(), volumes, &self.orbit, &tools)?;
         if let Some(tick) = last_tick {
             sample.passes.clone_from(&drawn.passes);
             self.history.push(sample);
@@ -675,6 +676,14 @@ impl Shown {
             PanelAsk::Solver => {
                 self.session.set_solver();
                 // A script has one solver from its start on.
+                if self.take.is_some() {
+                    self.reset();
+                }
+                Ok(())
+            }
+            PanelAsk::Beat => {
+                self.session.set_beat();
+                // Nor has it another heartbeat later on.
                 if self.take.is_some() {
                     self.reset();
                 }

@@ -6,7 +6,8 @@ use glam::Vec3;
 
 /// Buffers of a surface. Only the positions change.
 pub struct MeshBuffers {
-    /// Where each point lies now [m], `[vec4f; points]`, `w` is 1.
+    /// Where each point lies now [m], `[vec4f; points]`; `w` is what its tissue would fill if nothing pressed it, over that
+    /// at rest: 1 unless muscle has shortened.
     pub positions: wgpu::Buffer,
     /// The same, as a table for kernels that look up many.
     pub position_table: Table,
@@ -22,6 +23,8 @@ pub struct MeshBuffers {
     pub vertex_count: u32,
     /// Entries of `indices`.
     pub index_count: u32,
+    /// The `w` of each position; nothing where all are 1.
+    volumes: Vec<f32>,
 }
 
 impl MeshBuffers {
@@ -31,7 +34,7 @@ impl MeshBuffers {
     ///
     /// [`GpuError::BufferTooLarge`] if the adapter can't bind one of the lists.
     pub fn new(gpu: &Gpu, mesh: &SurfaceMesh) -> Result<Self, GpuError> {
-        let places = places(&mesh.points);
+        let places = places(&mesh.points, &[]);
         Ok(Self {
             positions: storage(gpu, "positions", &places)?,
             position_table: Table::new(gpu, "positions", Entry::Floats, &places)?,
@@ -41,7 +44,23 @@ impl MeshBuffers {
             point_count: mesh.points.len() as u32,
             vertex_count: mesh.uvs.len() as u32,
             index_count: 3 * mesh.triangles.len() as u32,
+            volumes: Vec::new(),
         })
+    }
+
+    /// Says what the tissue at each point would fill if nothing pressed it, over that at rest, from the next upload on.
+    ///
+    /// # Panics
+    ///
+    /// If there is not one volume a point.
+    pub fn set_volumes(&mut self, volumes: &[f32]) {
+        assert_eq!(
+            volumes.len(),
+            self.point_count as usize,
+            "one volume a point"
+        );
+        self.volumes.clear();
+        self.volumes.extend_from_slice(volumes);
     }
 
     /// Replaces the positions [m] before the next submitted frame.
@@ -55,7 +74,7 @@ impl MeshBuffers {
             self.point_count as usize,
             "one position a point"
         );
-        let places = places(points);
+        let places = places(points, &self.volumes);
         gpu.queue
             .write_buffer(&self.positions, 0, bytemuck::cast_slice(&places));
         self.position_table.write(gpu, &places);
@@ -70,6 +89,9 @@ impl MeshBuffers {
     }
 }
 
-fn places(points: &[Vec3]) -> Vec<[f32; 4]> {
-    points.iter().map(|p| [p.x, p.y, p.z, 1.0]).collect()
+fn places(points: &[Vec3], volumes: &[f32]) -> Vec<[f32; 4]> {
+    let volumes = volumes.iter().copied().chain(std::iter::repeat(1.0));
+    (points.iter().zip(volumes))
+        .map(|(p, volume)| [p.x, p.y, p.z, volume])
+        .collect()
 }

@@ -1,5 +1,6 @@
 //! `[body]`: what is prodded.
 
+use super::beat::BeatSection;
 use super::check::Checker;
 use super::place::RestBox;
 use crate::geom::paint::Tissue;
@@ -51,6 +52,9 @@ pub struct BodySection {
     /// Where the body is held.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<Region>,
+    /// Muscle that beats.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beat: Option<BeatSection>,
 }
 
 /// Shapes by formula.
@@ -176,7 +180,20 @@ impl Region {
 }
 
 impl Region {
-    fn check(&self, key: &str, c: &mut Checker) {
+    pub(super) fn check(&self, key: &str, c: &mut Checker) {
+        let given = [
+            self.box_m.is_some(),
+            self.box_share.is_some(),
+            self.sphere_m.is_some(),
+            self.sphere_share.is_some(),
+            self.plane_m.is_some(),
+            self.plane_share.is_some(),
+        ];
+        c.exactly_one(
+            key,
+            &given,
+            "box_m, box_share, sphere_m, sphere_share, plane_m, plane_share",
+        );
         for corners in [self.box_m, self.box_share].into_iter().flatten() {
             c.corners(key, corners);
         }
@@ -266,20 +283,10 @@ impl BodySection {
         c.range("body.damping_per_s", self.damping_per_s, 0.0, 1000.0);
         c.range("body.map_size_px", self.map_size_px as f32, 64.0, 4096.0);
         for (index, region) in self.fixed.iter().enumerate() {
-            let given = [
-                region.box_m.is_some(),
-                region.box_share.is_some(),
-                region.sphere_m.is_some(),
-                region.sphere_share.is_some(),
-                region.plane_m.is_some(),
-                region.plane_share.is_some(),
-            ];
-            c.exactly_one(
-                &format!("body.fixed.{index}"),
-                &given,
-                "box_m, box_share, sphere_m, sphere_share, plane_m, plane_share",
-            );
             region.check(&format!("body.fixed.{index}"), c);
+        }
+        if let Some(beat) = &self.beat {
+            beat.check(c);
         }
     }
 }

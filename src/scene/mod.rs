@@ -4,6 +4,7 @@
 //! Places are given in metres (`…_m`) or as shares of the body's box at rest (`…_share`), so that one
 //! script prods any organ.
 
+mod beat;
 mod body;
 mod camera;
 mod check;
@@ -16,6 +17,7 @@ mod place;
 mod surface;
 mod tool;
 
+pub use beat::BeatSection;
 pub use body::{Ball, BodySection, HalfSpace, MapFiles, Region, Shape};
 pub use camera::*;
 pub use error::SceneError;

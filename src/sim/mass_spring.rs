@@ -7,7 +7,7 @@
 //! Source of the stiffness: Van Gelder, "Approximate Simulation of Elastic Membranes by
 //! Triangulated Spring Meshes", JGT 3, 1998; the average is derived here.
 
-use super::team::Team;
+use super::{muscle::Muscle, team::Team};
 use crate::geom::TetMesh;
 use glam::{Vec3, Vec4};
 use std::collections::BTreeMap;
@@ -59,6 +59,8 @@ pub struct MassSpring {
     springs: Vec<Spring>,
     /// Where the springs of each particle start; one more at the end.
     starts: Vec<u32>,
+    /// What of the body is muscle; nothing where it has never beaten.
+    pub muscle: Option<Muscle>,
     accelerations: Vec<Vec4>,
 }
 
@@ -86,13 +88,14 @@ impl MassSpring {
         Self {
             springs: at.concat(),
             starts,
+            muscle: None,
             accelerations: vec![Vec4::ZERO; mesh.particles.len()],
         }
     }
 
     /// Acceleration of each particle [m/s²] by its springs, of Young's modulus `modulus_pa`.
     pub fn accelerations(&mut self, team: &Team, particles: &[Vec4], modulus_pa: f32) -> &[Vec4] {
-        let (springs, starts) = (&self.springs, &self.starts);
+        let (springs, starts, muscle) = (&self.springs, &self.starts, self.muscle.as_ref());
         let at = |index: usize| {
             let here = particles[index];
             let mut force = Vec3::ZERO;
@@ -101,7 +104,13 @@ impl MassSpring {
                 let length = edge.length();
                 // Coincident particles have no direction to be pushed apart in.
                 if length > super::constraint::LENGTH_MIN_M {
-                    let stretch = (length - spring.rest_length_m) / length;
+                    let rest_m = match muscle {
+                        Some(muscle) => {
+                            spring.rest_length_m * muscle.between(index, spring.other as usize)
+                        }
+                        None => spring.rest_length_m,
+                    };
+                    let stretch = (length - rest_m) / length;
                     force += edge * (modulus_pa * spring.stiffness_per_modulus_m * stretch);
                 }
             }

@@ -4,6 +4,8 @@
 //! rigid tools. Everything is in SI units, and the same inputs give the same bits on any number of
 //! threads.
 
+mod beat;
+mod beating;
 mod coloring;
 pub mod constraint;
 mod contact;
@@ -14,6 +16,7 @@ mod implicit;
 mod lanes;
 mod mass_spring;
 mod model;
+mod muscle;
 mod neo_hookean;
 mod particles;
 mod parts;
@@ -22,6 +25,7 @@ mod springs;
 mod team;
 mod tools;
 
+pub use beat::Beat;
 pub use simulation::Simulation;
 
 use crate::geom::{Embedding, TetMesh, bounds};
@@ -156,6 +160,9 @@ pub struct BodySetup {
     /// Share of each tetrahedron that is tissue, scaling its stiffness: `Lattice::fill`, or nothing
     /// at all for a mesh that is all tissue.
     pub fill: Vec<f32>,
+    /// How much of each particle is muscle, from 0 to 1, for a body that beats; nothing at all for one that is
+    /// muscle throughout.
+    pub activity: Vec<f32>,
     /// Triangles of the surface; corners are points.
     pub triangles: Vec<[u32; 3]>,
     /// Where each surface point hangs in the tetrahedra.
@@ -204,6 +211,9 @@ impl BodySetup {
         self.tets.particles = reordered(&self.tets.particles, &order);
         self.masses_kg = reordered(&self.masses_kg, &order);
         self.fixed = reordered(&self.fixed, &order);
+        if !self.activity.is_empty() {
+            self.activity = reordered(&self.activity, &order);
+        }
         self
     }
 }

@@ -1,8 +1,8 @@
 //! The elastic model of a body, one of a closed set.
 
 use super::{
-    Method, SolverParams, implicit::Implicit, mass_spring::MassSpring, neo_hookean::NeoHookean,
-    springs::Springs, team::Team,
+    Method, SolverParams, implicit::Implicit, mass_spring::MassSpring, muscle::Muscle,
+    neo_hookean::NeoHookean, springs::Springs, team::Team,
 };
 use crate::geom::TetMesh;
 use glam::Vec4;
@@ -32,6 +32,30 @@ impl Model {
             Method::XpbdSprings => Self::Springs(Springs::new(mesh, sound, fill)),
             Method::Implicit => Self::Implicit(Box::new(Implicit::new(mesh, sound, fill, places))),
             Method::XpbdNeoHookean => Self::NeoHookean(NeoHookean::new(mesh, sound, fill)),
+        }
+    }
+
+    /// Takes over how much of each particle is muscle, which is at rest.
+    pub fn set_activity(&mut self, activity: &[f32]) {
+        let muscle = match self {
+            Self::Implicit(model) => return model.set_activity(activity),
+            Self::MassSpring(model) => &mut model.muscle,
+            Self::Springs(model) => &mut model.muscle,
+            Self::NeoHookean(model) => &mut model.muscle,
+        };
+        *muscle = Some(Muscle::new(activity));
+    }
+
+    /// Has muscle shorten from now on, as a share of its length.
+    pub fn shorten(&mut self, shortening: f32) {
+        let muscle = match self {
+            Self::Implicit(model) => return model.shorten(shortening),
+            Self::MassSpring(model) => &mut model.muscle,
+            Self::Springs(model) => &mut model.muscle,
+            Self::NeoHookean(model) => &mut model.muscle,
+        };
+        if let Some(muscle) = muscle {
+            muscle.shortening = shortening;
         }
     }
 

@@ -44,6 +44,7 @@ mod kernel;
 use super::{
     Lame, SolverParams,
     lanes::{Batches, LANES, Lanes, ParticleAccess, add_spare},
+    muscle::{Muscle, Pull},
     team::Team,
 };
 use crate::geom::TetMesh;
@@ -90,6 +91,8 @@ pub struct NeoHookean {
     accelerations: Vec<Vec4>,
     /// The last shape that was not wrecked [m], and spare places.
     sound: Vec<Vec4>,
+    /// What of the body is muscle; nothing where it has never beaten.
+    pub muscle: Option<Muscle>,
     /// What the responses and shares of `tets` were made for.
     ready_for: Option<SolverParams>,
     step: Step,
@@ -163,6 +166,7 @@ impl NeoHookean {
             tet_count: sound.len(),
             accelerations: vec![Vec4::ZERO; rest.len()],
             sound: rest,
+            muscle: None,
             ready_for: None,
             carry: Carry::default(),
             kept_by_all: 1.0,
@@ -199,10 +203,10 @@ impl NeoHookean {
         let step = self.step;
         let sound = ParticleAccess::new(&mut self.sound);
         let accelerations = ParticleAccess::new(&mut self.accelerations);
-        let work = if self.restoring {
-            Work::Restore
-        } else {
-            Work::Project
+        let work = match self.muscle.as_mut().map(Muscle::pull) {
+            _ if self.restoring => Work::Restore,
+            Some(pull) => Work::Contract(pull),
+            None => Work::Project,
         };
         let overloaded = AtomicBool::new(false);
         self.tets.for_each_part(team, particles, |run, places| {
@@ -266,7 +270,8 @@ impl NeoHookean {
         params: &SolverParams,
     ) -> Residual {
         self.step = step_of(params);
-        let residual = self.standing(team, particles);
+        let pull = self.muscle.as_mut().map(Muscle::pull);
+        let residual = self.standing(team, particles, pull);
         let count = residual.count.max(1) as f64;
         self.watch((residual.squared_sum / count).sqrt());
         let share = residual.wrecked as f64 / count;
@@ -299,12 +304,12 @@ impl NeoHookean {
         self.restoring
     }
 
-    fn standing(&self, team: &Team, particles: &mut [Vec4]) -> Residual {
+    fn standing(&self, team: &Team, particles: &mut [Vec4], pull: Option<Pull>) -> Residual {
         let places = ParticleAccess::new(particles);
         let volume_min = WRECKED_VOLUMES[usize::from(self.restoring)];
         let chunks: Vec<&[Batch]> = self.tets.as_slice().chunks(BATCHES_PER_CHUNK).collect();
         let standings = team.map(chunks.len(), |chunk| {
-            standing_of(chunks[chunk], places, self.step, volume_min)
+            standing_of(chunks[chunk], places, pull, self.step, volume_min)
         });
         let (squared_sum_pa2, wrecked) =
             (standings.into_iter()).fold((0.0, 0), |sum, own| (sum.0 + own.0, sum.1 + own.1));
@@ -397,9 +402,10 @@ fn step_of(params: &SolverParams) -> Step {
 }
 
 /// What is done to a run of batches.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 enum Work {
     Project,
+    Contract(Pull),
     Restore,
     Shed,
 }
@@ -450,7 +456,12 @@ fn run_batches<const WIDE: bool>(
     match work {
         Work::Project => {
             for batch in run {
-                over |= batch.project::<WIDE>(places, accelerations, step);
+                over |= batch.project::<WIDE>(places, accelerations, None, step);
+            }
+        }
+        Work::Contract(pull) => {
+            for batch in run {
+                over |= batch.project::<WIDE>(places, accelerations, Some(pull), step);
             }
         }
         Work::Restore => {
@@ -471,15 +482,16 @@ fn run_batches<const WIDE: bool>(
 fn standing_of(
     batches: &[Batch],
     places: ParticleAccess,
+    pull: Option<Pull>,
     step: Step,
     volume_share_min: f32,
 ) -> (f64, usize) {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the machine has AVX2.
-        return unsafe { standing_with_avx2(batches, places, step, volume_share_min) };
+        return unsafe { standing_with_avx2(batches, places, pull, step, volume_share_min) };
     }
-    add_standings::<false>(batches, places, step, volume_share_min)
+    add_standings::<false>(batches, places, pull, step, volume_share_min)
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -487,23 +499,25 @@ fn standing_of(
 fn standing_with_avx2(
     batches: &[Batch],
     places: ParticleAccess,
+    pull: Option<Pull>,
     step: Step,
     volume_share_min: f32,
 ) -> (f64, usize) {
-    add_standings::<true>(batches, places, step, volume_share_min)
+    add_standings::<true>(batches, places, pull, step, volume_share_min)
 }
 
 #[inline(always)]
 fn add_standings<const WIDE: bool>(
     batches: &[Batch],
     places: ParticleAccess,
+    pull: Option<Pull>,
     step: Step,
     volume_share_min: f32,
 ) -> (f64, usize) {
     let mut squared_sum_pa2 = 0.0;
     let mut wrecked = 0.0;
     for batch in batches {
-        let standing = batch.standing::<WIDE>(places, step, volume_share_min);
+        let standing = batch.standing::<WIDE>(places, pull, step, volume_share_min);
         for lane in 0..LANES {
             squared_sum_pa2 += f64::from(standing.residual_squared.0[lane]);
             wrecked += standing.wrecked.0[lane];

@@ -1,7 +1,8 @@
 //! The body's state and one step of it.
 
 use super::{
-    BodySetup, SolverParams, StepReport, ToolInput,
+    Beat, BodySetup, SolverParams, StepReport, ToolInput,
+    beating::Beating,
     contact::{DEPENETRATION_SPEED_M_S, Surface},
     diagnose::rest_volume_m3,
     grab::Tissue,
@@ -34,6 +35,7 @@ pub struct Simulation {
     sound: Vec<u32>,
     sound_tets: Vec<[u32; 4]>,
     rest_volume_m3: f64,
+    beating: Option<Beating>,
     size_m: f32,
     density_kg_m3: f32,
     edge_m: f32,
@@ -44,6 +46,9 @@ pub struct Simulation {
     /// Positions, as they are given out [m].
     positions: Vec<Vec3>,
     points: Vec<Vec3>,
+    /// What the tissue at each point of the surface would fill, as a share of its volume at rest; nothing while no
+    /// muscle works.
+    point_volumes: Vec<f32>,
     point_bounds: (Vec3, Vec3),
     report: StepReport,
     /// Where the particles were when they last were not calm [m], and for how many steps they have
@@ -96,6 +101,7 @@ impl Simulation {
             tools: Tools::default(),
             positions: mesh.particles.clone(),
             points: vec![Vec3::ZERO; setup.embedding.particles.len()],
+            point_volumes: Vec::new(),
             point_bounds: (Vec3::ZERO, Vec3::ZERO),
             report: StepReport::default(),
             calm_places: Vec::new(),
@@ -106,6 +112,7 @@ impl Simulation {
             density_kg_m3: (mass_kg / tissue_m3.max(f64::MIN_POSITIVE)) as f32,
             edge_m: (mean_volume * 72.0_f64.sqrt()).cbrt() as f32,
             rest_volume_m3,
+            beating: None,
             sound,
             sound_tets,
             solver: params,
@@ -174,6 +181,35 @@ impl Simulation {
         }
     }
 
+    /// Has the muscle of the body beat from the next step on, and wakes the body; with `None` it ends the beat that
+    /// it is in, and rests.
+    ///
+    /// # Panics
+    ///
+    /// If a value is out of range (see [`Beat::problem`]).
+    pub fn set_beat(&mut self, beat: Option<Beat>) {
+        if let Some(beat) = beat {
+            assert_usable(beat.problem());
+        }
+        match (&mut self.beating, beat) {
+            (None, None) => return,
+            (None, Some(beat)) => {
+                let beating = Beating::new(&self.setup, &self.sound, beat);
+                self.model.set_activity(&beating.activity);
+                self.beating = Some(beating);
+            }
+            (Some(beating), Some(beat)) => (beating.beat, beating.ends) = (beat, false),
+            (Some(beating), None) => beating.ends = true,
+        }
+        self.wake();
+    }
+
+    /// What the tissue at each point of the surface would fill if nothing pressed it, as a share of its volume at
+    /// rest: below 1 where muscle has shortened. `None` while no muscle works.
+    pub fn point_volumes(&self) -> Option<&[f32]> {
+        (!self.point_volumes.is_empty()).then_some(&self.point_volumes[..])
+    }
+
     /// Puts the body back to rest where it was made, tools forgotten, frozen particles free again.
     /// Parameters stay as they are.
     pub fn reset(&mut self) {
@@ -181,6 +217,10 @@ impl Simulation {
         self.tools = Tools::default();
         self.frozen = 0;
         self.report = StepReport::default();
+        if let Some(beating) = &mut self.beating {
+            beating.phase = 0.0;
+            self.model.shorten(0.0);
+        }
         self.model.forget(&mut self.particles.places, &self.solver);
         self.wake();
         self.publish(&Team::alone());
@@ -292,7 +332,12 @@ impl Simulation {
     fn new_model(&self) -> Model {
         let (mesh, fill) = (&self.setup.tets, &self.setup.fill);
         let places = &self.particles.places;
-        Model::new(self.solver.method, mesh, &self.sound, fill, places)
+        let mut model = Model::new(self.solver.method, mesh, &self.sound, fill, places);
+        if let Some(beating) = &self.beating {
+            model.set_activity(&beating.activity);
+            model.shorten(beating.shortening());
+        }
+        model
     }
 
     /// Substeps from which on `xpbd-neo-hookean` bears this body as stiffly as it is; `None` if those
@@ -304,6 +349,11 @@ impl Simulation {
             }
             Model::MassSpring(_) | Model::Springs(_) | Model::Implicit(_) => None,
         }
+    }
+
+    /// Volume of the shapes that the tetrahedra want now [m³].
+    fn rest_volume_now_m3(&self) -> f64 {
+        self.rest_volume_m3 - self.beating.as_ref().map_or(0.0, Beating::lost_m3)
     }
 
     fn wake(&mut self) {
@@ -347,7 +397,8 @@ impl Simulation {
         let speed_max_m_s = self.particles.speed_max_m_s();
         // By the way and not the speed: where something presses, light particles tremble.
         let way_max_m = CALM_SIZES * self.size_m;
-        if stirred || self.particles.farthest_m(&self.calm_places) > way_max_m {
+        let beats = self.beating.as_ref().is_some_and(Beating::works);
+        if stirred || beats || self.particles.farthest_m(&self.calm_places) > way_max_m {
             self.calm_places.copy_from_slice(&self.particles.places);
             self.calm_steps = 0;
         } else {
@@ -356,7 +407,7 @@ impl Simulation {
         let surface = surface(&self.setup, &self.points, self.point_bounds);
         self.report = StepReport {
             residual_rms: standing.residual_rms,
-            volume_drift: (standing.volume_m3 / self.rest_volume_m3 - 1.0) as f32,
+            volume_drift: (standing.volume_m3 / self.rest_volume_now_m3() - 1.0) as f32,
             tool_forces_n: self.tools.forces_n(self.solver.substeps),
             penetration_max_m: (self.tools).penetration_max_m(surface, &self.particles),
             inverted_tets: standing.inverted_tets,
@@ -378,6 +429,9 @@ impl Simulation {
     fn move_on(&mut self, team: &Team) -> Standing {
         for substep in 0..self.solver.substeps {
             self.substep(team, substep);
+        }
+        if let Some(beating) = &mut self.beating {
+            beating.advance(f64::from(self.solver.timestep_s));
         }
         // Where a step is one solve after another, damping is one of its forces: struck off once a
         // step, a wave that turns as a step ends would keep all of its speed.
@@ -418,6 +472,10 @@ impl Simulation {
         let substep_s = self.solver.substep_s();
         let share = |k: u32| k as f32 / self.solver.substeps as f32;
         let (from, to) = (share(substep), share(substep + 1));
+        if let Some(beating) = &self.beating {
+            let ahead_s = f64::from(to) * f64::from(self.solver.timestep_s);
+            self.model.shorten(beating.shortening_in(ahead_s));
+        }
         if let Model::Implicit(model) = &mut self.model {
             let step = Step {
                 gravity_m_s2: self.setup.gravity_m_s2,
@@ -460,6 +518,10 @@ impl Simulation {
             }
         });
         self.point_bounds = bounds(&self.points);
+        if let Some(beating) = &self.beating {
+            self.point_volumes.clear();
+            self.point_volumes.extend(beating.point_volumes());
+        }
     }
 }
 
@@ -489,6 +551,11 @@ fn check(setup: &BodySetup) {
     assert!(
         setup.masses_kg.iter().all(|&m| m.is_finite() && m > 0.0),
         "every particle has a mass"
+    );
+    assert!(
+        (setup.activity.is_empty() || setup.activity.len() == count)
+            && setup.activity.iter().all(|a| (0.0..=1.0).contains(a)),
+        "one activity a particle, or none at all"
     );
     assert!(
         setup.fill.len() == setup.tets.tets.len() && setup.fill.iter().all(|&fill| fill > 0.0),

@@ -9,6 +9,7 @@ use super::{
     constraint::LENGTH_MIN_M,
     lanes::{Batches, Corner, Corners, LANES, Lanes, Lanes3, ParticleAccess},
     mass_spring::edges_of,
+    muscle::{Muscle, Pull},
     team::Team,
 };
 use crate::geom::TetMesh;
@@ -44,6 +45,8 @@ struct VolumeBatch {
 pub struct Springs {
     edges: Batches<EdgeBatch>,
     volumes: Batches<VolumeBatch>,
+    /// What of the body is muscle; nothing where it has never beaten.
+    pub muscle: Option<Muscle>,
 }
 
 /// One over modulus and h² [1/(Pa s²)], for edges and for volumes; `None` where nothing resists.
@@ -99,7 +102,11 @@ impl Springs {
             }
             batch
         });
-        Self { edges, volumes }
+        Self {
+            edges,
+            volumes,
+            muscle: None,
+        }
     }
 
     /// Sets all multipliers to 0, as a substep starts.
@@ -115,21 +122,23 @@ impl Springs {
     /// One sweep over all edges, then over all volumes.
     pub fn project(&mut self, team: &Team, particles: &mut [Vec4], lame: Lame, substep_s: f32) {
         let compliance = Compliance::new(lame, substep_s);
+        let pull = self.muscle.as_mut().map(Muscle::pull);
         self.edges.for_each_part(team, particles, |run, access| {
-            project_edges(run, access, compliance.edge);
+            project_edges(run, access, pull, compliance.edge);
         });
         if let Some(compliance) = compliance.volume {
             self.volumes.for_each_part(team, particles, |run, access| {
-                project_volumes(run, access, compliance);
+                project_volumes(run, access, pull, compliance);
             });
         }
     }
 
     /// Sum of squares of all residuals C + α̃λ, each over its rest length or volume, and how many
     /// there are.
-    pub fn residual(&self, particles: &mut [Vec4], lame: Lame, substep_s: f32) -> (f64, usize) {
+    pub fn residual(&mut self, particles: &mut [Vec4], lame: Lame, substep_s: f32) -> (f64, usize) {
         let compliance = Compliance::new(lame, substep_s);
         let access = ParticleAccess::new(particles);
+        let pull = self.muscle.as_mut().map(Muscle::pull);
         let (mut sum, mut count) = (0.0, 0);
         // Both corners of a lane that is not used are the same spare place.
         let mut add = |corners: [&[u32; LANES]; 2], residual: Lanes, rest: Lanes| {
@@ -141,7 +150,7 @@ impl Springs {
         for batch in self.edges.as_slice() {
             // SAFETY: the batches are of these particles, and nothing else runs.
             let corners = [0, 1].map(|k| unsafe { access.gather::<false>(&batch.corners[k]) });
-            let residual = edge_value(batch, &corners).0
+            let residual = edge_value(batch, &corners, pull).0
                 + batch.geometry.times(compliance.edge) * batch.lambda;
             add(batch.corners.each_ref(), residual, batch.rest_length);
         }
@@ -150,7 +159,7 @@ impl Springs {
                 // SAFETY: as above.
                 let corners =
                     [0, 1, 2, 3].map(|k| unsafe { access.gather::<false>(&batch.corners[k]) });
-                let residual = volume_value(batch, &corners).0
+                let residual = volume_value(batch, &corners, pull).0
                     + batch.geometry.times(compliance) * batch.lambda;
                 let ends = [&batch.corners[0], &batch.corners[1]];
                 add(ends, residual, batch.rest_volume);
@@ -160,47 +169,67 @@ impl Springs {
     }
 }
 
-fn project_edges(run: &mut [EdgeBatch], access: ParticleAccess, compliance: f32) {
+fn project_edges(
+    run: &mut [EdgeBatch],
+    access: ParticleAccess,
+    pull: Option<Pull>,
+    compliance: f32,
+) {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the machine has AVX2.
-        return unsafe { project_edges_avx2(run, access, compliance) };
+        return unsafe { project_edges_avx2(run, access, pull, compliance) };
     }
     for batch in run {
-        project_edge_batch(batch, access, compliance);
+        project_edge_batch(batch, access, pull, compliance);
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn project_edges_avx2(run: &mut [EdgeBatch], access: ParticleAccess, compliance: f32) {
+fn project_edges_avx2(
+    run: &mut [EdgeBatch],
+    access: ParticleAccess,
+    pull: Option<Pull>,
+    compliance: f32,
+) {
     for batch in run {
-        project_edge_batch(batch, access, compliance);
+        project_edge_batch(batch, access, pull, compliance);
     }
 }
 
-fn project_volumes(run: &mut [VolumeBatch], access: ParticleAccess, compliance: f32) {
+fn project_volumes(
+    run: &mut [VolumeBatch],
+    access: ParticleAccess,
+    pull: Option<Pull>,
+    compliance: f32,
+) {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the machine has AVX2.
-        return unsafe { project_volumes_avx2(run, access, compliance) };
+        return unsafe { project_volumes_avx2(run, access, pull, compliance) };
     }
     for batch in run {
-        project_volume_batch(batch, access, compliance);
+        project_volume_batch(batch, access, pull, compliance);
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn project_volumes_avx2(run: &mut [VolumeBatch], access: ParticleAccess, compliance: f32) {
+fn project_volumes_avx2(
+    run: &mut [VolumeBatch],
+    access: ParticleAccess,
+    pull: Option<Pull>,
+    compliance: f32,
+) {
     for batch in run {
-        project_volume_batch(batch, access, compliance);
+        project_volume_batch(batch, access, pull, compliance);
     }
 }
 
 /// Value and direction of `constraint::distance`; no direction where the particles coincide.
 #[inline(always)]
-fn edge_value(batch: &EdgeBatch, corners: &[Corner; 2]) -> (Lanes, Lanes3) {
+fn edge_value(batch: &EdgeBatch, corners: &[Corner; 2], pull: Option<Pull>) -> (Lanes, Lanes3) {
     let edge = corners[0].position - corners[1].position;
     let length = edge.dot(edge).map(f32::sqrt);
     let inverse = Lanes::where_below(
@@ -209,11 +238,21 @@ fn edge_value(batch: &EdgeBatch, corners: &[Corner; 2]) -> (Lanes, Lanes3) {
         Lanes::default(),
         length.map(|l| 1.0 / l.max(LENGTH_MIN_M)),
     );
-    (length - batch.rest_length, edge.scaled(inverse))
+    let mut rest_length = batch.rest_length;
+    if let Some(pull) = pull {
+        // SAFETY: the activities are as long as the particles, and nobody writes them.
+        rest_length = rest_length * unsafe { pull.scale::<false, 2>(&batch.corners) };
+    }
+    (length - rest_length, edge.scaled(inverse))
 }
 
 #[inline(always)]
-fn project_edge_batch(batch: &mut EdgeBatch, access: ParticleAccess, compliance: f32) {
+fn project_edge_batch(
+    batch: &mut EdgeBatch,
+    access: ParticleAccess,
+    pull: Option<Pull>,
+    compliance: f32,
+) {
     // SAFETY: a batch works in the part that `for_each_part` gives it.
     let mut corners = unsafe {
         [
@@ -221,7 +260,7 @@ fn project_edge_batch(batch: &mut EdgeBatch, access: ParticleAccess, compliance:
             access.gather::<false>(&batch.corners[1]),
         ]
     };
-    let (value, direction) = edge_value(batch, &corners);
+    let (value, direction) = edge_value(batch, &corners, pull);
     let alpha = batch.geometry.times(compliance);
     let effective = (corners[0].inverse_mass + corners[1].inverse_mass) * direction.dot(direction);
     let delta = -(value + alpha * batch.lambda) * (effective + alpha).map(|x| 1.0 / x);
@@ -238,7 +277,11 @@ fn project_edge_batch(batch: &mut EdgeBatch, access: ParticleAccess, compliance:
 
 /// Value and gradients of `constraint::volume`.
 #[inline(always)]
-fn volume_value(batch: &VolumeBatch, corners: &[Corner; 4]) -> (Lanes, [Lanes3; 4]) {
+fn volume_value(
+    batch: &VolumeBatch,
+    corners: &[Corner; 4],
+    pull: Option<Pull>,
+) -> (Lanes, [Lanes3; 4]) {
     let origin = corners[0].position;
     let a = corners[1].position - origin;
     let b = corners[2].position - origin;
@@ -247,11 +290,22 @@ fn volume_value(batch: &VolumeBatch, corners: &[Corner; 4]) -> (Lanes, [Lanes3; 
     let g1 = b.cross(c).scaled(sixth);
     let g2 = c.cross(a).scaled(sixth);
     let g3 = a.cross(b).scaled(sixth);
-    (a.dot(g1) - batch.rest_volume, [-(g1 + g2 + g3), g1, g2, g3])
+    let mut rest_volume = batch.rest_volume;
+    if let Some(pull) = pull {
+        // SAFETY: as in `edge_value`.
+        let scale = unsafe { pull.scale::<false, 4>(&batch.corners) };
+        rest_volume = rest_volume * scale * scale * scale;
+    }
+    (a.dot(g1) - rest_volume, [-(g1 + g2 + g3), g1, g2, g3])
 }
 
 #[inline(always)]
-fn project_volume_batch(batch: &mut VolumeBatch, access: ParticleAccess, compliance: f32) {
+fn project_volume_batch(
+    batch: &mut VolumeBatch,
+    access: ParticleAccess,
+    pull: Option<Pull>,
+    compliance: f32,
+) {
     // SAFETY: a batch works in the part that `for_each_part` gives it.
     let mut corners = unsafe {
         [
@@ -261,7 +315,7 @@ fn project_volume_batch(batch: &mut VolumeBatch, access: ParticleAccess, complia
             access.gather::<false>(&batch.corners[3]),
         ]
     };
-    let (value, gradient) = volume_value(batch, &corners);
+    let (value, gradient) = volume_value(batch, &corners, pull);
     let alpha = batch.geometry.times(compliance);
     let mut effective = alpha;
     for k in 0..4 {
@@ -336,7 +390,7 @@ mod tests {
         springs
             .volumes
             .for_each_part(&Team::alone(), &mut places, |run, access| {
-                project_volumes(run, access, compliance);
+                project_volumes(run, access, None, compliance);
             });
         for k in 0..4 {
             // Corrections are of the order of 1e-4 m.
@@ -365,6 +419,7 @@ mod tests {
         project_edges(
             &mut springs.edges.as_mut_slice()[..1],
             ParticleAccess::new(&mut places),
+            None,
             compliance,
         );
         assert!(places[0].truncate().distance(expected) < 1e-8);

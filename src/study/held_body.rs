@@ -57,6 +57,7 @@ impl HeldBody {
             masses_kg: lumped_masses_kg(&tets, density_kg_m3),
             fixed: fixed.collect(),
             fill: Vec::new(),
+            activity: Vec::new(),
             triangles: skin.triangles,
             embedding: Embedding {
                 particles: skin.particles.iter().map(|&i| [i; 4]).collect(),

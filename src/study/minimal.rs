@@ -446,7 +446,7 @@ fn draw(
             p + away * wave * Vec3::new(0.6, 0.64, 0.48)
         })
         .collect();
-    let drawn = renderer.draw(&moved, &orbit, &[])?;
+    let drawn = renderer.draw(&moved, None, &orbit, &[])?;
     Ok(drawn.passes.iter().map(|pass| pass.gpu_ms).sum())
 }
 

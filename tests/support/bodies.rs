@@ -17,6 +17,7 @@ pub fn block(size_m: Vec3, cells: [usize; 3], fixed: impl Fn(Vec3) -> bool) -> B
         fixed: lattice.tets.particles.iter().map(|&x| fixed(x)).collect(),
         masses_kg: lumped_masses_kg(&lattice.tets, DENSITY_KG_M3),
         fill: lattice.fill,
+        activity: Vec::new(),
         triangles: surface.point_triangles(),
         embedding: lattice.embedding,
         tets: lattice.tets,

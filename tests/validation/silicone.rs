@@ -21,6 +21,7 @@ fn setup(tets: TetMesh, masses_kg: Vec<f32>, fill: Vec<f32>) -> BodySetup {
         fixed: tets.particles.iter().map(|x| x.z <= 1e-3).collect(),
         masses_kg,
         fill,
+        activity: Vec::new(),
         tets,
         gravity_m_s2: Vec3::new(0.0, -9.81, 0.0),
         damping_per_s: 10.0,

@@ -118,6 +118,14 @@ impl From<Lame> for Moduli {
     }
 }
 
+impl Contraction<'_> {
+    /// Scale of the rest shapes of batch number `index` of the run.
+    #[inline(always)]
+    fn scale<W: Wide>(&self, index: usize) -> W {
+        W::splat(1.0) - W::load(&self.activity[index]) * W::splat(self.shortening)
+    }
+}
+
 impl Batch {
     /// A batch of up to eight elements. Unused lanes get the node `unused_node` and the place
     /// `unused_place`.
@@ -174,6 +182,15 @@ pub const PAIRS: [(usize, usize); 10] = [
     (3, 3),
 ];
 
+/// Muscle among the tetrahedra of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Contraction<'a> {
+    /// Activity of each batch of the run.
+    pub activity: &'a [Lanes],
+    /// Shortening of full muscle, as a share of its length.
+    pub shortening: f32,
+}
+
 /// Adds the forces of `run` at `displacements` [m] to `forces` [N].
 ///
 /// # Safety
@@ -183,15 +200,16 @@ pub unsafe fn add_forces(
     run: &[Batch],
     displacements: &[DVec4],
     moduli: Moduli,
+    muscle: Option<Contraction<'_>>,
     forces: *mut Vec4,
 ) -> Strain {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the machine has AVX2; the rest as the caller's.
-        return unsafe { add_forces_avx2(run, displacements, moduli, forces) };
+        return unsafe { add_forces_avx2(run, displacements, moduli, muscle, forces) };
     }
     // SAFETY: as the caller's.
-    unsafe { add_forces_of::<Plain>(run, displacements, moduli, forces) }
+    unsafe { add_forces_of::<Plain>(run, displacements, moduli, muscle, forces) }
 }
 
 /// Adds the stiffness of `run` at `displacements` [m], made positive, to the blocks on and right of
@@ -205,15 +223,16 @@ pub unsafe fn add_stiffness(
     run: &[Batch],
     displacements: &[DVec4],
     moduli: Moduli,
+    muscle: Option<Contraction<'_>>,
     blocks: *mut Block,
 ) {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the machine has AVX2; the rest as the caller's.
-        return unsafe { add_stiffness_avx2(run, displacements, moduli, blocks) };
+        return unsafe { add_stiffness_avx2(run, displacements, moduli, muscle, blocks) };
     }
     // SAFETY: as the caller's.
-    unsafe { add_stiffness_of::<Plain>(run, displacements, moduli, blocks) }
+    unsafe { add_stiffness_of::<Plain>(run, displacements, moduli, muscle, blocks) }
 }
 
 /// The same code, compiled for eight lanes an instruction. No fused multiply-add: bits stay.
@@ -223,10 +242,11 @@ unsafe fn add_forces_avx2(
     run: &[Batch],
     displacements: &[DVec4],
     moduli: Moduli,
+    muscle: Option<Contraction<'_>>,
     forces: *mut Vec4,
 ) -> Strain {
     // SAFETY: as the caller's.
-    unsafe { add_forces_of::<Avx2>(run, displacements, moduli, forces) }
+    unsafe { add_forces_of::<Avx2>(run, displacements, moduli, muscle, forces) }
 }
 
 /// As above.
@@ -236,10 +256,11 @@ unsafe fn add_stiffness_avx2(
     run: &[Batch],
     displacements: &[DVec4],
     moduli: Moduli,
+    muscle: Option<Contraction<'_>>,
     blocks: *mut Block,
 ) {
     // SAFETY: as the caller's.
-    unsafe { add_stiffness_of::<Avx2>(run, displacements, moduli, blocks) }
+    unsafe { add_stiffness_of::<Avx2>(run, displacements, moduli, muscle, blocks) }
 }
 
 /// Deformation of eight tetrahedra.
@@ -275,14 +296,31 @@ impl<W: Wide> Deformation<W> {
     ///
     /// Every corner is an index into `displacements`.
     #[inline(always)]
-    unsafe fn new(batch: &Batch, displacements: &[DVec4], g: [Vector<W>; 3]) -> Self {
+    unsafe fn new(
+        batch: &Batch,
+        displacements: &[DVec4],
+        g: [Vector<W>; 3],
+        scale: Option<W>,
+    ) -> Self {
         // SAFETY: as the caller's.
         let edges = unsafe { W::edge_changes(displacements, &batch.corners) };
-        let d = [
+        let mut d = [
             combine(edges, g[0].x, g[1].x, g[2].x),
             combine(edges, g[0].y, g[1].y, g[2].y),
             combine(edges, g[0].z, g[1].z, g[2].z),
         ];
+        // F/s − 1 = (D + 1 − s)/s.
+        if let Some(scale) = scale {
+            let (change, inverse) = (W::splat(1.0) - scale, W::splat(1.0) / scale);
+            d[0].x = d[0].x + change;
+            d[1].y = d[1].y + change;
+            d[2].z = d[2].z + change;
+            d = [
+                d[0].times(inverse),
+                d[1].times(inverse),
+                d[2].times(inverse),
+            ];
+        }
         let c = [d[1].cross(d[2]), d[2].cross(d[0]), d[0].cross(d[1])];
         let trace = d[0].x + d[1].y + d[2].z;
         let second = c[0].x + c[1].y + c[2].z;
@@ -399,23 +437,37 @@ unsafe fn add_forces_of<W: Wide>(
     run: &[Batch],
     displacements: &[DVec4],
     moduli: Moduli,
+    muscle: Option<Contraction<'_>>,
     forces: *mut Vec4,
 ) -> Strain {
     let mut energy = [0.0_f64; LANES];
     let mut squares = W::splat(0.0);
     let (mut lost, mut torn) = (W::splat(0.0), W::splat(0.0));
-    for batch in run {
+    for (index, batch) in run.iter().enumerate() {
+        // No closure: it would be compiled for the narrow vectors of the base machine.
+        let mut scale = None;
+        if let Some(muscle) = muscle {
+            scale = Some(muscle.scale::<W>(index));
+        }
         let [g1, g2, g3] = &batch.gradients;
         let (g1, g2, g3) = (Vector::load(g1), Vector::load(g2), Vector::load(g3));
         // SAFETY: as the caller's.
-        let f = unsafe { Deformation::<W>::new(batch, displacements, [g1, g2, g3]) };
-        let volume = W::load(&batch.volume);
+        let f = unsafe { Deformation::<W>::new(batch, displacements, [g1, g2, g3], scale) };
+        // The energy of the shape that muscle wants is V s³ ψ(F/s), its forces are V s² P(F/s) g.
+        let mut volume = W::load(&batch.volume);
+        if let Some(scale) = scale {
+            volume = volume * scale * scale;
+        }
         let squared = f.squared();
         let unequal = f.second + f.determinant;
         let shear = squared - (unequal + unequal);
         let density = shear * W::splat(0.5 * moduli.mu)
             + f.dilation * f.dilation * W::splat(0.5 * moduli.dilation);
-        let energies = (volume * density).store();
+        let mut energies = volume * density;
+        if let Some(scale) = scale {
+            energies = energies * scale;
+        }
+        let energies = energies.store();
         for lane in 0..LANES {
             energy[lane] += f64::from(energies.0[lane]);
         }
@@ -454,14 +506,24 @@ unsafe fn add_stiffness_of<W: Wide>(
     run: &[Batch],
     displacements: &[DVec4],
     moduli: Moduli,
+    muscle: Option<Contraction<'_>>,
     blocks: *mut Block,
 ) {
-    for batch in run {
+    for (index, batch) in run.iter().enumerate() {
+        // No closure: it would be compiled for the narrow vectors of the base machine.
+        let mut scale = None;
+        if let Some(muscle) = muscle {
+            scale = Some(muscle.scale::<W>(index));
+        }
         let [g1, g2, g3] = &batch.gradients;
         let (g1, g2, g3) = (Vector::load(g1), Vector::load(g2), Vector::load(g3));
         // SAFETY: as the caller's.
-        let f = unsafe { Deformation::<W>::new(batch, displacements, [g1, g2, g3]) };
-        let (volume, one) = (W::load(&batch.volume), W::splat(1.0));
+        let f = unsafe { Deformation::<W>::new(batch, displacements, [g1, g2, g3], scale) };
+        let (mut volume, one) = (W::load(&batch.volume), W::splat(1.0));
+        // And the derivative of those V s ∂P/∂F.
+        if let Some(scale) = scale {
+            volume = volume * scale;
+        }
         let [x, y, z] = f.cofactor;
         let cover = W::splat(moduli.dilation / moduli.mu) * (x.dot(x) + y.dot(y) + z.dot(z));
         let crushed = (one - cover).max(W::splat(0.0));

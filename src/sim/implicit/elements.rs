@@ -2,10 +2,10 @@
 //! on all of the implicit method; the strips fix the order of its sums.
 
 use super::{
-    element::{self, Batch, Element, Moduli, Strain},
+    element::{self, Batch, Contraction, Element, Moduli, Strain},
     matrix::BlockMatrix,
     strips::strips,
-    wide::LANES,
+    wide::{LANES, Lanes},
 };
 use crate::sim::Lame;
 use glam::{DVec3, DVec4, Vec4};
@@ -18,6 +18,10 @@ pub struct Elements {
     batches: Vec<Batch>,
     /// Batches of each strip: first the even strips, then the odd ones.
     strips: Vec<Range<usize>>,
+    /// Activity of each batch of a body that beats; nothing where it has never beaten.
+    activity: Vec<Lanes>,
+    /// Shortening of full muscle, as a share of its length.
+    pub shortening: f32,
     /// Nodes the batches know, the unused one not counted.
     node_count: usize,
     /// Blocks the batches know, the unused one not counted.
@@ -41,6 +45,8 @@ impl Elements {
             elements: Vec::with_capacity(elements.len()),
             batches: Vec::new(),
             strips: Vec::new(),
+            activity: Vec::new(),
+            shortening: 0.0,
             node_count,
             block_count: matrix.block_count(),
         };
@@ -66,6 +72,40 @@ impl Elements {
         &self.elements
     }
 
+    /// Takes over how much of each node is muscle.
+    pub fn set_activity(&mut self, activity: &[f32]) {
+        let of = |element: &Element| -> f32 {
+            element
+                .nodes
+                .iter()
+                .map(|&n| activity[n as usize])
+                .sum::<f32>()
+                / 4.0
+        };
+        let mut elements = self.elements.iter();
+        let lanes = self.batches.iter().map(|batch| {
+            let unused = self.node_count as u32;
+            let used = batch.corners[0].map(|node| node != unused);
+            Lanes(used.map(|used| {
+                if used {
+                    elements.next().map_or(0.0, of)
+                } else {
+                    0.0
+                }
+            }))
+        });
+        self.activity = lanes.collect();
+    }
+
+    fn muscle(&self, strip: &Range<usize>) -> Option<Contraction<'_>> {
+        self.activity
+            .get(strip.clone())
+            .map(|activity| Contraction {
+                activity,
+                shortening: self.shortening,
+            })
+    }
+
     /// Sets `forces` to the elastic forces on the nodes at `displacements` [N].
     ///
     /// # Panics
@@ -82,7 +122,10 @@ impl Elements {
         for strip in &self.strips {
             let batches = &self.batches[strip.clone()];
             // SAFETY: corners are nodes, or the unused node.
-            let part = unsafe { element::add_forces(batches, displacements, moduli, forces) };
+            let part = unsafe {
+                let muscle = self.muscle(strip);
+                element::add_forces(batches, displacements, moduli, muscle, forces)
+            };
             strain = strain.and(part);
         }
         strain
@@ -103,7 +146,10 @@ impl Elements {
         for strip in &self.strips {
             let batches = &self.batches[strip.clone()];
             // SAFETY: corners are nodes and offsets are in the matrix, the unused ones too.
-            unsafe { element::add_stiffness(batches, displacements, moduli, blocks) };
+            unsafe {
+                let muscle = self.muscle(strip);
+                element::add_stiffness(batches, displacements, moduli, muscle, blocks);
+            }
         }
     }
 }

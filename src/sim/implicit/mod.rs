@@ -180,6 +180,22 @@ impl Implicit {
         self.past_substep_s = None;
     }
 
+    /// Takes over how much of each particle is muscle.
+    pub fn set_activity(&mut self, activity: &[f32]) {
+        let in_order = |&i: &u32| activity[i as usize];
+        let activity: Vec<f32> = self.order.particle.iter().map(in_order).collect();
+        self.newton.elements.set_activity(&activity);
+    }
+
+    /// Has muscle shorten, as a share of its length.
+    pub fn shorten(&mut self, shortening: f32) {
+        let old = std::mem::replace(&mut self.newton.elements.shortening, shortening);
+        if old != shortening {
+            // The energy of the same place is another.
+            self.elastic_j = None;
+        }
+    }
+
     /// Starts a time step.
     pub fn begin_step(&mut self) {
         self.newton.begin_step();

@@ -1,6 +1,9 @@
 //! Eight neo-Hookean tetrahedra at a time: the arithmetic of one projection.
 
-use super::super::lanes::{Corner, Corners, LANES, Lanes, Lanes3, ParticleAccess};
+use super::super::{
+    lanes::{Corner, Corners, LANES, Lanes, Lanes3, ParticleAccess},
+    muscle::Pull,
+};
 
 /// Eight tetrahedra.
 #[derive(Clone, Debug)]
@@ -88,12 +91,43 @@ impl Batch {
         ]
     }
 
+    /// That of the shape at rest, or of the one that `pull` wants; then with the scale s of that one.
     #[inline(always)]
-    fn deformation(&self, corners: &[Corner; 4]) -> Deformation {
-        let f = self.gradient(edges(corners));
+    fn deformation<const WIDE: bool>(
+        &self,
+        corners: &[Corner; 4],
+        pull: Option<Pull>,
+    ) -> (Deformation, Option<Lanes>) {
+        let mut f = self.gradient(edges(corners));
+        // No closure: it would be compiled for the narrow vectors of the base machine.
+        let mut scale = None;
+        if let Some(pull) = pull {
+            // SAFETY: as in `gather`.
+            let pulled = unsafe { pull.scale::<WIDE, 4>(&self.corners) };
+            scale = Some(pulled);
+            let inverse = Lanes::splat(1.0) / pulled;
+            for column in &mut f {
+                *column = column.scaled(inverse);
+            }
+        }
         let cofactor = [f[1].cross(f[2]), f[2].cross(f[0]), f[0].cross(f[1])];
         let j = f[0].dot(cofactor[0]);
-        Deformation { f, cofactor, j }
+        (Deformation { f, cofactor, j }, scale)
+    }
+
+    /// What the stress of the deformation is above the multipliers [Pa].
+    #[inline(always)]
+    fn misfit(&self, of: &Deformation, scale: Option<Lanes>, step: Step) -> [Lanes3; 3] {
+        let volumetric = (of.j - Lanes::splat(1.0)).times(step.bulk_pa) - Lanes::splat(step.mu_pa);
+        let mut rest = [Lanes3::default(); 3];
+        for i in 0..3 {
+            let mut stress = of.f[i].times(step.mu_pa) + of.cofactor[i].scaled(volumetric);
+            if let Some(scale) = scale {
+                stress = stress.scaled(scale * scale);
+            }
+            rest[i] = stress - self.stress[i];
+        }
+        rest
     }
 
     /// What a change D of the stress does to the acceleration of each corner, −V w D g.
@@ -164,24 +198,25 @@ impl Batch {
 
     /// Moves stress and corners to where they fit each other, with the neighbours held. Returns
     /// whether a stress is too large to be carried over.
+    ///
+    /// With a `pull`, the stiffness is that of the shape at rest all the same: the pulled one's is s times as
+    /// much, and a stiffer one only shortens steps whose end is the same.
     #[inline(always)]
     pub fn project<const WIDE: bool>(
         &mut self,
         particles: ParticleAccess,
         accelerations: ParticleAccess,
+        pull: Option<Pull>,
         step: Step,
     ) -> bool {
         let corners = self.gather::<WIDE>(particles);
-        let Deformation { f, cofactor, j } = self.deformation(&corners);
-        let volumetric = (j - Lanes::splat(1.0)).times(step.bulk_pa) - Lanes::splat(step.mu_pa);
+        let (deformation, scale) = self.deformation::<WIDE>(&corners, pull);
+        let mut rest = self.misfit(&deformation, scale, step);
+        let cofactor = deformation.cofactor;
         let k = self.volume_m3.times(OWN_RESPONSE * step.h2_s2);
         let bulk = k.times(step.bulk_pa);
         let shear = k.times(STIFFNESS_IN_MU * step.mu_pa);
 
-        let mut rest = [Lanes3::default(); 3];
-        for i in 0..3 {
-            rest[i] = f[i].times(step.mu_pa) + cofactor[i].scaled(volumetric) - self.stress[i];
-        }
         // Sherman and Morrison: the rank-one bulk term on top of the isotropic one.
         let bent = self.responded(cofactor);
         let share = inner(rest, bent) * bulk / (Lanes::splat(1.0) + bulk * inner(cofactor, bent));
@@ -287,15 +322,13 @@ impl Batch {
     pub fn standing<const WIDE: bool>(
         &self,
         particles: ParticleAccess,
+        pull: Option<Pull>,
         step: Step,
         volume_share_min: f32,
     ) -> Standing {
-        let Deformation { f, cofactor, j } = self.deformation(&self.gather::<WIDE>(particles));
-        let volumetric = (j - Lanes::splat(1.0)).times(step.bulk_pa) - Lanes::splat(step.mu_pa);
-        let mut rest = [Lanes3::default(); 3];
-        for i in 0..3 {
-            rest[i] = f[i].times(step.mu_pa) + cofactor[i].scaled(volumetric) - self.stress[i];
-        }
+        let (deformation, scale) = self.deformation::<WIDE>(&self.gather::<WIDE>(particles), pull);
+        let rest = self.misfit(&deformation, scale, step);
+        let Deformation { f, j, .. } = deformation;
         let squared = inner(f, f);
         // A lane that is not used has no volume and is nobody's wreck. Written so that NaN is one.
         let mut wrecked = Lanes::splat(1.0);

@@ -204,10 +204,10 @@ fn narrow_and_wide_vectors_give_the_same_bits() {
         for batch in model.tets.as_mut_slice() {
             #[cfg(target_arch = "x86_64")]
             if wide && std::arch::is_x86_feature_detected!("avx2") {
-                batch.project::<true>(access, accelerations, step);
+                batch.project::<true>(access, accelerations, None, step);
                 continue;
             }
-            batch.project::<false>(access, accelerations, step);
+            batch.project::<false>(access, accelerations, None, step);
         }
         let _ = wide;
         found.push(places);

@@ -31,6 +31,7 @@ fn setup(surface: &SurfaceMesh, lattice: Lattice, fixed: impl Fn(Vec3) -> bool) 
         fixed: lattice.tets.particles.iter().map(|&x| fixed(x)).collect(),
         masses_kg: lattice.masses_kg,
         fill: lattice.fill,
+        activity: Vec::new(),
         triangles: surface.point_triangles(),
         embedding: lattice.embedding,
         tets: lattice.tets,
