@@ -249,6 +249,18 @@ fn a_body_of_another_unit_is_told_and_one_too_small_to_weigh_is_refused() {
     assert!(message.contains("body.size_m"), "{message}");
 }
 
+#[test]
+fn a_shape_by_formula_is_as_long_as_its_size_says() {
+    let small = session(SLAB, &["body.size_m=0.05", "body.cell_m=0.0025"]).expect("it is sound");
+    let extent = small.rest.high - small.rest.low;
+    assert!(
+        extent.distance(Vec3::new(0.05, 0.01, 0.05)) < 1e-7,
+        "{extent}"
+    );
+    let plain = session(SLAB, &[]).expect("it is sound");
+    assert!((plain.rest.longest_m() - 0.1).abs() < 1e-7);
+}
+
 /// A beam of 10 x 5 x 5 cm times `scale`, clamped at x = 0.
 fn beam_of(scale: f32) -> BodySetup {
     let (surface, block) = lattice::block_of_cells(Vec3::new(0.1, 0.05, 0.05), [10, 5, 5]);

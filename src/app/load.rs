@@ -378,6 +378,15 @@ fn cell_or_guess(section: &BodySection, volume_m3: f32) -> f32 {
         .unwrap_or_else(|| lattice::cell_for_volume_m(volume_m3))
 }
 
+/// Extent of a shape [m], made as long as its section says.
 fn extent(section: &BodySection) -> Vec3 {
-    section.extent_m.expect("a checked shape has an extent")
+    let extent_m = section.extent_m.expect("a checked shape has an extent");
+    let longest_m = match section.shape {
+        // A ball has the first as its diameter.
+        Some(Shape::Sphere) => extent_m.x,
+        _ => extent_m.max_element(),
+    };
+    section
+        .size_m
+        .map_or(extent_m, |size_m| size_m / longest_m * extent_m)
 }

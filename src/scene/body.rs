@@ -24,7 +24,7 @@ pub struct BodySection {
     /// Only the meshes of the file whose name contains one of these.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub meshes: Option<Vec<String>>,
-    /// Longest extent of the file's body [m]; left out, the file's units are metres.
+    /// Longest extent of the body [m]; left out, the file's units are metres, and a shape is as `extent_m` says.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size_m: Option<f32>,
     /// Edge of a lattice cell [m], of a graded slab the finest; left out, it follows from the volume and a budget of tetrahedra.

@@ -589,3 +589,26 @@ fn a_soft_body_that_hangs_to_twice_its_length_is_no_wreck() {
         "{default} against {implicit}"
     );
 }
+
+#[test]
+fn a_wrecked_body_that_its_load_holds_still_does_not_fall_asleep_on_its_way_back() {
+    // A load of ten moduli tears it long: what leads it back and the load soon hold each other in balance,
+    // which is no rest of its material.
+    let mut setup = body(Vec3::new(0.02, 0.02, 0.06), 0.01, |x| x.z > 0.0599);
+    setup.gravity_m_s2 = Vec3::new(0.0, 0.0, -1000.0);
+    setup.damping_per_s = 10.0;
+    let params = SolverParams {
+        youngs_modulus_pa: 6e3,
+        poisson_ratio: 0.45,
+        ..soft(Method::XpbdNeoHookean)
+    };
+    let mut simulation = Simulation::new(setup, params);
+    let mut led_steps = 0;
+    for step in 0..200 {
+        let report = simulation.step(&[]);
+        led_steps += u32::from(report.restoring);
+        assert!(!(report.asleep && report.restoring), "step {step}");
+    }
+    // Longer than it takes to fall asleep, or the check would see nothing.
+    assert!(led_steps > 60, "{led_steps}");
+}

@@ -14,7 +14,8 @@ const SUBSTEPS_MAX: u32 = 8192;
 /// How long a substep may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
-    /// The longest that keeps the body together [s]; `None` if one substep a step does.
+    /// The longest that keeps the body together [s]; `None` if one substep a step does, and if none of
+    /// [`SUBSTEPS_MAX`] does: what is so soft hangs as far down as an exploding body is thrown.
     pub found_s: Option<f64>,
     /// What the method itself says, of the body at rest [s].
     pub estimate_s: Option<f64>,
@@ -42,14 +43,17 @@ impl Limit {
     }
 }
 
-/// The fewest substeps that are stable, by bisection; `None` if one is.
+/// The fewest substeps that are stable, by bisection; `None` if one is, or not even [`SUBSTEPS_MAX`].
 fn fewest(is_stable: impl Fn(u32) -> bool) -> Option<u32> {
     if is_stable(1) {
         return None;
     }
     let mut unstable = 1;
-    while unstable < SUBSTEPS_MAX && !is_stable(2 * unstable) {
+    while !is_stable(2 * unstable) {
         unstable *= 2;
+        if unstable >= SUBSTEPS_MAX {
+            return None;
+        }
     }
     let mut stable = 2 * unstable;
     while stable - unstable > 1 {
@@ -85,6 +89,15 @@ mod tests {
             assert_eq!(fewest(|substeps| substeps >= edge), Some(edge));
         }
         assert_eq!(fewest(|_| true), None);
+    }
+
+    #[test]
+    fn search_for_what_is_never_stable_ends_and_asks_for_no_more_substeps_than_it_may() {
+        let is_stable = |substeps| {
+            assert!(substeps <= SUBSTEPS_MAX, "{substeps}");
+            false
+        };
+        assert_eq!(fewest(is_stable), None);
     }
 
     #[test]

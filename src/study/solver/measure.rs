@@ -60,7 +60,7 @@ pub struct Measures {
     /// Difference to the oracle's volume, settled, over the rest volume.
     pub volume_error_rel: Option<f64>,
     /// Longest substep that keeps the body together [s], found by bisection; absent if one a frame
-    /// does. Beside it the estimate of the method.
+    /// does, or none was found. Beside it the estimate of the method.
     pub stable_substep_s: Option<f64>,
     pub stable_substep_estimate_s: Option<f64>,
     /// Processor time of a frame on one thread, median [ms]: what a quiet machine would need.
