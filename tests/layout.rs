@@ -295,6 +295,10 @@ fn mirrors() -> Vec<Mirror> {
                 lights,
                 extinction,
                 albedo,
+                reflectance,
+                kept,
+                around,
+                leaked,
                 through,
                 size,
                 inner,
@@ -317,8 +321,8 @@ fn mirrors() -> Vec<Mirror> {
                 blur_radius_m,
                 noise_m,
                 noise_lookups,
+                room_light,
                 pad0,
-                pad1,
             }
         ),
         mirror!(
