@@ -534,7 +534,8 @@ fn film_parity_check_rejects_a_roughness_that_is_not_squared() {
 fn often_difference(gpu: &Gpu, source: &str) -> f32 {
     // to the light, to the eye, cosines | r0 | around
     let cases = cases(|n| {
-        let three = |n: &mut Numbers, high: f32| Vec3::from_array([(); 3].map(|()| n.between(0.0, high)));
+        let three =
+            |n: &mut Numbers, high: f32| Vec3::from_array([(); 3].map(|()| n.between(0.0, high)));
         [
             Vec4::new(n.between(-1.0, 1.0), n.next(), 0.0, 0.0),
             three(n, 0.95).extend(0.0),

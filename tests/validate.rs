@@ -77,8 +77,16 @@ fn scattering_of_all_orders_is_nearer_with_the_calibrated_term_in_every_scene() 
         let (once, calibrated) = (error("relRMSE_once"), error("relRMSE_calibrated"));
         println!("{}: {once:.3}, calibrated {calibrated:.3}", row["name"]);
         // From behind, where light leaks all through the ball, a half remains; elsewhere a fifth was seen.
-        let share = if row["name"] == "b_main_back" { 0.7 } else { 0.5 };
-        assert!(calibrated < share * once, "{}: {calibrated} for {once}", row["name"]);
+        let share = if row["name"] == "b_main_back" {
+            0.7
+        } else {
+            0.5
+        };
+        assert!(
+            calibrated < share * once,
+            "{}: {calibrated} for {once}",
+            row["name"]
+        );
     }
     assert!(rows.len() >= 8, "all scenes have a reference of all orders");
 }

@@ -141,14 +141,25 @@ mod tests {
             let name = tissue.name();
             assert!(s.x < s.y && s.y < s.z, "{name}: {s}");
             assert!(5.0 * a.x < a.y && a.y < a.z, "{name}: {a}");
-            assert!(albedo.x > albedo.y && albedo.y >= albedo.z, "{name}: {albedo}");
+            assert!(
+                albedo.x > albedo.y && albedo.y >= albedo.z,
+                "{name}: {albedo}"
+            );
             assert!((0.5..0.75).contains(&layer.asymmetry), "{name}");
         }
         // Fat is the palest, blood the darkest.
         let green = |tissue: OpticalTissue| tissue.layer().albedo().y;
         for tissue in OpticalTissue::ALL {
-            assert!(green(OpticalTissue::Fat) >= green(tissue), "{}", tissue.name());
-            assert!(green(OpticalTissue::Vessel) <= green(tissue), "{}", tissue.name());
+            assert!(
+                green(OpticalTissue::Fat) >= green(tissue),
+                "{}",
+                tissue.name()
+            );
+            assert!(
+                green(OpticalTissue::Vessel) <= green(tissue),
+                "{}",
+                tissue.name()
+            );
         }
     }
 

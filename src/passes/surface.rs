@@ -8,7 +8,9 @@ use super::light_path::CoverKind;
 use super::maps::Maps;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join};
 use crate::optics::LAYERS;
-use crate::scene::{InnerLight, InnerTaps, Multiple, Noise, Quadrature, SurfaceKind, SurfaceSection};
+use crate::scene::{
+    InnerLight, InnerTaps, Multiple, Noise, Quadrature, SurfaceKind, SurfaceSection,
+};
 
 /// What a surface reads, made by other passes.
 pub struct SurfaceInputs<'a> {

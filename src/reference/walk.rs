@@ -185,7 +185,10 @@ mod tests {
             let phase = (1.0 - k * k) / (4.0 * PI * base * base);
             let exact = 2.0 / 2.6 * phase * cos_light / (cos_light + cos_eye);
             // 20,000 walks of numbers between 0 and twice their mean: 0.6 % is one standard error.
-            assert!((once / exact - 1.0).abs() < 0.025, "k {k}: {once} for {exact}");
+            assert!(
+                (once / exact - 1.0).abs() < 0.025,
+                "k {k}: {once} for {exact}"
+            );
         }
     }
 
@@ -200,7 +203,10 @@ mod tests {
         // H(1)² at albedo 0.8, of the integral equation solved with 64 Gauss points.
         let exact = 0.8 / (4.0 * PI) * 0.5 * 1.59822 * 1.59822;
         assert!(error < 0.02 * exact, "{error}");
-        assert!((full - exact).abs() < 4.0 * error, "{full} ± {error} for {exact}");
+        assert!(
+            (full - exact).abs() < 4.0 * error,
+            "{full} ± {error} for {exact}"
+        );
         // What the check would say of light scattered once.
         assert!((once - exact).abs() > 20.0 * error, "{once}");
     }

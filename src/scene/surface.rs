@@ -384,7 +384,8 @@ mod tests {
     use crate::scene::{LayerSection, Scene, SceneSource};
 
     fn scene(surface: &str, sets: &[&str]) -> Result<Scene, String> {
-        let text = format!("[body]\nshape = \"slab\"\nextent_m = [1.0, 1.0, 1.0]\n[surface]\n{surface}");
+        let text =
+            format!("[body]\nshape = \"slab\"\nextent_m = [1.0, 1.0, 1.0]\n[surface]\n{surface}");
         let source = SceneSource {
             name: "test",
             text: &text,
@@ -421,7 +422,10 @@ mod tests {
 
     #[test]
     fn an_unknown_tissue_is_answered_with_the_known_ones() {
-        for told in [scene("tissue = \"tofu\"", &[]), scene("", &["surface.tissue=tofu"])] {
+        for told in [
+            scene("tissue = \"tofu\"", &[]),
+            scene("", &["surface.tissue=tofu"]),
+        ] {
             let message = told.expect_err("there is no such tissue");
             assert!(message.contains("tofu"), "{message}");
             for tissue in OpticalTissue::ALL {

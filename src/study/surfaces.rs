@@ -7,9 +7,7 @@
 use super::Study;
 use super::findings::Findings;
 use super::sweep::{Cost, Row, State, Sweep, Verdict, finite};
-use crate::app::{
-    AppError, ReferenceScene, Still, folder_scenes, load_scene, read_full_reference,
-};
+use crate::app::{AppError, ReferenceScene, Still, folder_scenes, load_scene, read_full_reference};
 use crate::geom::SurfaceMesh;
 use crate::geom::lattice::sphere;
 use crate::geom::paint::TissueMaps;
@@ -222,19 +220,32 @@ impl Sweep for Surfaces {
                 radius_m: 0.008,
                 walks: if quick { 12 } else { 96 },
             },
-            truth: if quick { String::new() } else { truth.unwrap_or_default() },
+            truth: if quick {
+                String::new()
+            } else {
+                truth.unwrap_or_default()
+            },
         }
     }
 
     fn cells(plan: &Plan) -> Result<Vec<Cell>, String> {
         let ball = &plan.ball;
         if !(2..=100_000).contains(&ball.walks) {
-            return Err(format!("ball.walks = {}: choose from 2 to 100000", ball.walks));
+            return Err(format!(
+                "ball.walks = {}: choose from 2 to 100000",
+                ball.walks
+            ));
         }
         if !(1e-3..=1.0).contains(&ball.radius_m) {
-            return Err(format!("ball.radius_m = {}: choose from 0.001 to 1", ball.radius_m));
+            return Err(format!(
+                "ball.radius_m = {}: choose from 0.001 to 1",
+                ball.radius_m
+            ));
         }
-        let own = ball.light.iter().map(|side| (side.scene().to_owned(), None));
+        let own = ball
+            .light
+            .iter()
+            .map(|side| (side.scene().to_owned(), None));
         let mut scenes: Vec<(String, Option<PathBuf>)> = own.collect();
         if !plan.truth.is_empty() {
             let files = folder_scenes(Path::new(&plan.truth)).map_err(|e| e.to_string())?;
@@ -281,7 +292,9 @@ impl Sweep for Surfaces {
         for _ in 0..FRAMES {
             let passes = large.draw()?;
             frame_ms.push(passes.iter().map(|pass| pass.gpu_ms).sum::<f32>());
-            let own = passes.iter().filter(|pass| !SHARED_PASSES.contains(&pass.name));
+            let own = passes
+                .iter()
+                .filter(|pass| !SHARED_PASSES.contains(&pass.name));
             own_ms.push(own.map(|pass| pass.gpu_ms).sum::<f32>());
         }
         let own = Stats::of(own_ms);
@@ -323,7 +336,9 @@ struct Stage {
 impl Surfaces {
     fn stage(&self, cell: &Cell) -> Result<(Stage, Arc<Oracle>), AppError> {
         let Some(file) = &cell.file else {
-            let side = Side::ALL.into_iter().find(|side| side.scene() == cell.scene);
+            let side = Side::ALL
+                .into_iter()
+                .find(|side| side.scene() == cell.scene);
             let side = side.ok_or_else(|| AppError::Usage(format!("no scene {}", cell.scene)))?;
             let stage = ball(&self.plan.ball, side, cell.surface)?;
             let mut walked = self.walked.lock().expect("no cell panics");
@@ -474,7 +489,11 @@ fn walked_picture(stage: &Stage, plan: &BallPlan, threads: usize) -> Oracle {
     let covered: Vec<bool> = entries.iter().map(Option::is_some).collect();
     let lines: Vec<HalfLine> = entries.iter().flatten().copied().collect();
     let light = &stage.scene.lights[0];
-    let to_light = light.toward.expect("the ball's light is far").as_dvec3().normalize();
+    let to_light = light
+        .toward
+        .expect("the ball's light is far")
+        .as_dvec3()
+        .normalize();
     let layer = Layer::from(stage.scene.surface.layers[0]);
     let pixels = (width * height) as usize;
     let (mut rgb, mut error) = (vec![0.0; 3 * pixels], vec![0.0; 3 * pixels]);
@@ -510,11 +529,13 @@ struct Off {
 fn off(got: &[f32], oracle: &Oracle) -> Off {
     let places: Vec<usize> = (0..got.len()).filter(|i| oracle.mask[i / 3]).collect();
     let value = |list: &[f32], i: usize| f64::from(list[i]);
-    let sum = |places: &[usize], f: &dyn Fn(usize) -> f64| places.iter().map(|&i| f(i)).sum::<f64>();
+    let sum =
+        |places: &[usize], f: &dyn Fn(usize) -> f64| places.iter().map(|&i| f(i)).sum::<f64>();
     let exact = |i: usize| value(&oracle.rgb, i);
     let test = |i: usize| value(got, i);
     let noise = |i: usize| value(&oracle.error, i).powi(2);
-    let gain = sum(&places, &|i| test(i) * exact(i)) / sum(&places, &|i| test(i).powi(2)).max(1e-300);
+    let gain =
+        sum(&places, &|i| test(i) * exact(i)) / sum(&places, &|i| test(i).powi(2)).max(1e-300);
     let error = |places: &[usize], gain: f64| {
         let difference = sum(places, &|i| (gain * test(i) - exact(i)).powi(2) - noise(i));
         (difference.max(0.0) / sum(places, &|i| exact(i).powi(2)).max(1e-300)).sqrt()
@@ -524,10 +545,18 @@ fn off(got: &[f32], oracle: &Oracle) -> Off {
     sorted.sort_by(f64::total_cmp);
     // The brightest pixel may be a lucky walk.
     let white = crate::measure::stats::percentile(&sorted, 0.98).unwrap_or(0.0);
-    let dim: Vec<usize> = places.iter().copied().filter(|&i| bright(i) < DIM * white).collect();
+    let dim: Vec<usize> = places
+        .iter()
+        .copied()
+        .filter(|&i| bright(i) < DIM * white)
+        .collect();
     Off {
         picture: error(&places, gain),
-        dim: if dim.is_empty() { f64::NAN } else { error(&dim, gain) },
+        dim: if dim.is_empty() {
+            f64::NAN
+        } else {
+            error(&dim, gain)
+        },
         absolute: error(&places, 1.0),
         noise: (sum(&places, &noise) / sum(&places, &|i| exact(i).powi(2)).max(1e-300)).sqrt(),
     }
@@ -572,7 +601,10 @@ fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
     };
     let mut scenes: Vec<&str> = rows.iter().map(|row| row.cell.scene.as_str()).collect();
     scenes.dedup();
-    let charts: Vec<String> = scenes.iter().map(|scene| chart(rows, scene).svg()).collect();
+    let charts: Vec<String> = scenes
+        .iter()
+        .map(|scene| chart(rows, scene).svg())
+        .collect();
     let captions = scenes.iter().map(|scene| (*scene).to_owned());
     Findings {
         svg: sheet(&charts, CHART_PX, 2),
@@ -644,7 +676,11 @@ mod tests {
         let twice: Vec<f32> = oracle.rgb.iter().map(|v| 2.0 * v).collect();
         let found = off(&twice, &oracle);
         // Rounding of f32.
-        assert!(found.picture < 1e-6 && found.dim < 1e-6, "{}", found.picture);
+        assert!(
+            found.picture < 1e-6 && found.dim < 1e-6,
+            "{}",
+            found.picture
+        );
         assert!((found.absolute - 1.0).abs() < 1e-6);
     }
 
@@ -655,6 +691,11 @@ mod tests {
             .map(|&v| if v < 0.05 { 0.0 } else { v })
             .collect();
         let found = off(&wrong, &oracle);
-        assert!(found.dim > 4.0 * found.picture, "{} {}", found.dim, found.picture);
+        assert!(
+            found.dim > 4.0 * found.picture,
+            "{} {}",
+            found.dim,
+            found.picture
+        );
     }
 }

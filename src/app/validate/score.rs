@@ -98,9 +98,7 @@ pub fn reference(scene: &ReferenceScene) -> Result<Option<Reference>, AppError> 
 /// # Errors
 ///
 /// As [`reference`].
-pub fn full_reference(
-    scene: &ReferenceScene,
-) -> Result<Option<(Reference, Vec<f32>)>, AppError> {
+pub fn full_reference(scene: &ReferenceScene) -> Result<Option<(Reference, Vec<f32>)>, AppError> {
     let arrays = Arrays::of(scene)?.filter(|arrays| arrays.has("full") && arrays.has("full_se"));
     arrays
         .map(|arrays| Ok((arrays.reference("full")?, arrays.rgb("full_se")?)))

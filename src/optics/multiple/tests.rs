@@ -87,11 +87,20 @@ fn worst(albedo: f32, k: f32, form: impl Fn(f32, f32, Vec3) -> Vec3) -> f64 {
 #[test]
 fn the_closed_form_is_within_a_tenth_of_walks_and_the_full_albedo_is_not() {
     let form = |cos_light, cos_eye, r0| often(cos_light, cos_eye, r0, Vec3::ZERO);
-    for (albedo, k) in [(0.5, 0.0), (0.769, 0.25), (0.625, 0.25), (0.909, 0.4), (0.8, 0.645)] {
+    for (albedo, k) in [
+        (0.5, 0.0),
+        (0.769, 0.25),
+        (0.625, 0.25),
+        (0.909, 0.4),
+        (0.8, 0.645),
+    ] {
         let off = worst(albedo, k, form);
         println!("albedo {albedo}, k {k}: {:.1} % off", 100.0 * off);
-        // 12 % was seen of k = 0.645 in another run of the walks, whose own noise is 1 to 2 %; 6 % of the others.
-        assert!(off < if k > 0.5 { 0.15 } else { 0.1 }, "albedo {albedo}, k {k}: {off}");
+        // 11 % was seen of k = 0.645 and 7 % of the others, where noise of the walks is 1 to 2 %.
+        assert!(
+            off < if k > 0.5 { 0.15 } else { 0.1 },
+            "albedo {albedo}, k {k}: {off}"
+        );
     }
     // Hapke's own ϖ in place of ϖ′.
     let naive = |cos_light: f32, cos_eye: f32, _: Vec3| {
@@ -99,7 +108,10 @@ fn the_closed_form_is_within_a_tenth_of_walks_and_the_full_albedo_is_not() {
         let r0 = Vec3::splat((1.0 - gamma) / (1.0 + gamma));
         often(cos_light, cos_eye, r0, Vec3::ZERO)
     };
-    assert!(worst(0.8, 0.645, naive) > 0.2, "the check must be able to fail");
+    assert!(
+        worst(0.8, 0.645, naive) > 0.2,
+        "the check must be able to fail"
+    );
 }
 
 /// Share of a far light that a flat body throws back: scattered once by its phase function, and more often.
@@ -113,8 +125,8 @@ fn thrown_back_flat(albedo: f32, k: f32, cos_light: f32) -> f64 {
         for column in 0..STEPS {
             let azimuth = std::f32::consts::TAU * (column as f32 + 0.5) / STEPS as f32;
             let between = cos_light * cos_eye + sine(cos_light) * sine(cos_eye) * azimuth.cos();
-            let source = albedo * medium::phase(between, k)
-                + often(cos_light, cos_eye, r0, Vec3::ZERO).x;
+            let source =
+                albedo * medium::phase(between, k) + often(cos_light, cos_eye, r0, Vec3::ZERO).x;
             let radiance = source * cos_light / (cos_light + cos_eye);
             sum += f64::from(radiance * cos_eye);
         }
@@ -170,8 +182,8 @@ fn what_leaks_round_a_ball_is_taken_from_its_lit_side() {
             let share = thrown_back_by_ball(&layer, &leak);
             println!("albedo {albedo}, radius {radius_m}: {share:.3}, flat {flat:.3}");
             assert!(share < 1.0, "albedo {albedo}, radius {radius_m}: {share}");
-            // 13 % was seen where light is softened most.
-            assert!((share / flat - 1.0).abs() < 0.2, "{share} for {flat}");
+            // 8 % was seen where light is softened most.
+            assert!((share / flat - 1.0).abs() < 0.12, "{share} for {flat}");
         }
         let large = Leak::of(&layer, 1e3);
         assert!((large.kept - 1.0).abs().max_element() < 1e-3);
