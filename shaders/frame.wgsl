@@ -20,6 +20,13 @@ struct Frame {
     extinction: array<vec4f, 8>,
     // sigma_s / sigma_t of each layer.
     albedo: array<vec4f, 8>,
+    // r0 of each layer: what it throws back of even light, were it endless.
+    reflectance: array<vec4f, 8>,
+    // Light scattered more than once: the share that stays where it fell, how far round the terminator the rest comes, and
+    // its radiance per irradiance [1/sr].
+    kept: vec4f,
+    around: vec4f,
+    leaked: vec4f,
     // Diffuse attenuation of light that comes through the body [1/m].
     through: vec4f,
     // Width and height of the picture [px], and their inverses.
@@ -53,8 +60,9 @@ struct Frame {
     noise_lookups: u32,
     // What radiance is multiplied by before the tone curve.
     exposure: f32,
+    // Multiplies the light of the room on the tissue.
+    room_light: f32,
     pad0: f32,
-    pad1: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -72,6 +72,15 @@ fn sources_of(p: Phases) -> Layers {
     return sources;
 }
 
+// With what scatters more than once.
+fn with_often(k: u32, ray: Ray, sources: Layers) -> Layers {
+    var sum = sources;
+    for (var j = 0u; j < LAYER_COUNT; j += 1u) {
+        sum.each[j] += often_of(k, j, ray);
+    }
+    return sum;
+}
+
 fn boundary(pick: Pick, bottoms: Bottoms) -> f32 {
     return of_layer(pick, bottoms);
 }
@@ -201,7 +210,7 @@ fn by_layer(ray: Ray, unshadowed: f32) -> Gathered {
     var sum: Gathered;
     for (var j = 0u; j < LAYER_COUNT; j += 1u) {
         let p = vec4f(p0.each[j], p1.each[j], p2.each[j], p3.each[j]);
-        let light = gather_layer(&m, ray, layers, layers.each[j], j, p);
+        let light = gather_layer(&m, ray, layers, layers.each[j], j, j, p);
         add(&sum, j, light * frame.albedo[j].xyz);
     }
     return sum;

@@ -47,6 +47,16 @@ fn sources_of(p: Phases) -> Layers {
     );
 }
 
+// With what scatters more than once.
+fn with_often(k: u32, ray: Ray, sources: Layers) -> Layers {
+    return Layers(
+        sources.t0 + often_of(k, 0u, ray),
+        sources.t1 + often_of(k, 1u, ray),
+        sources.t2 + often_of(k, 2u, ray),
+        sources.t3 + often_of(k, 3u, ray),
+    );
+}
+
 fn boundary(pick: Pick, bottoms: Bottoms) -> f32 {
     return dot(pick, bottoms);
 }
@@ -72,17 +82,17 @@ fn by_layer(ray: Ray, unshadowed: f32) -> Gathered {
     var third = vec3f(0.0);
     var fourth = vec3f(0.0);
     let pick0 = select(vec3f(1.0, 0.0, 0.0), none, LAYER_COUNT == 1u);
-    let first = gather_layer(&m, ray, layers, layers.t0, pick0, vec4f(p0.x, p1.x, p2.x, p3.x));
+    let first = gather_layer(&m, ray, layers, layers.t0, pick0, 0u, vec4f(p0.x, p1.x, p2.x, p3.x));
     if LAYER_COUNT > 1u {
         let pick = select(vec3f(0.0, 1.0, 0.0), none, LAYER_COUNT == 2u);
-        second = gather_layer(&m, ray, layers, layers.t1, pick, vec4f(p0.y, p1.y, p2.y, p3.y));
+        second = gather_layer(&m, ray, layers, layers.t1, pick, 1u, vec4f(p0.y, p1.y, p2.y, p3.y));
     }
     if LAYER_COUNT > 2u {
         let pick = select(vec3f(0.0, 0.0, 1.0), none, LAYER_COUNT == 3u);
-        third = gather_layer(&m, ray, layers, layers.t2, pick, vec4f(p0.z, p1.z, p2.z, p3.z));
+        third = gather_layer(&m, ray, layers, layers.t2, pick, 2u, vec4f(p0.z, p1.z, p2.z, p3.z));
     }
     if LAYER_COUNT > 3u {
-        fourth = gather_layer(&m, ray, layers, layers.t3, none, vec4f(p0.w, p1.w, p2.w, p3.w));
+        fourth = gather_layer(&m, ray, layers, layers.t3, none, 3u, vec4f(p0.w, p1.w, p2.w, p3.w));
     }
     return Gathered(
         first * frame.albedo[0].xyz + second * frame.albedo[1].xyz,

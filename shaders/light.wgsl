@@ -43,7 +43,7 @@ fn way_through(world: vec3f, normal: vec3f) -> f32 {
 
 // Light of the room from everywhere, brighter from above [W/m2].
 fn ambient(normal: vec3f) -> vec3f {
-    return (1.0 + 0.7 * normal.y) * vec3f(0.150, 0.165, 0.175);
+    return frame.room_light * (1.0 + 0.7 * normal.y) * vec3f(0.150, 0.165, 0.175);
 }
 
 // Light that leaves the tissue after many scatterings, per colour [W/m2]: wrapped round the terminator, and

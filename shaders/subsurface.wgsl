@@ -6,6 +6,9 @@
 //   (ds, dt) = (PM . g_u, PM . g_v)                        with the metric of the deformed surface
 //   L    = sum over lights and segments (medium.wgsl) + albedo diffuse / pi + film
 //
+// Light scattered more than once is that diffuse term, in the colour of the maps, or (OFTEN) comes from the medium: then
+// each layer scatters albedo p + often (multiple.wgsl), and what leaks out of a small body is wrapped round its terminator.
+//
 // Each sample reads the layers once, for all lights; the light's way is split over the layers at M (their mean
 // with those at K' changes little and costs a fetch a light). The layers are tinted by the colour maps: the
 // upper half by the outer one, the lower half by the inner one. How many layers there are is the matter of the file
@@ -24,6 +27,8 @@ override QUADRATURE: u32 = 0u;
 // Samples of the last two; of the first, samples in each layer.
 override SAMPLES: u32 = 4u;
 override PIECES: u32 = 1u;
+// 1: light that scattered more than once comes from the medium.
+override OFTEN: u32 = 0u;
 
 // What the march needs of a ray.
 struct Ray {
@@ -142,8 +147,23 @@ fn follow(k: u32, ray: Ray, s: Stretch, layers: Layers, last: Beam) -> Followed 
     return Followed(next, (s.a1 - s.a0) * mean * last.irradiance);
 }
 
+// What stands beside albedo times phase of layer `j` for light `k` scattered more than once [1/sr].
+fn often_of(k: u32, j: u32, ray: Ray) -> vec3f {
+    if OFTEN == 0u {
+        return vec3f(0.0);
+    }
+    let cos_light = dot(ray.cover.normal, light_at(k, ray.world).to_light);
+    let scattered = often(cos_light, ray.cos_eye, frame.reflectance[j].xyz, frame.around.xyz);
+    return frame.multiple_scattering * frame.kept.xyz * scattered;
+}
+
+// The same beside the phase function alone.
+fn phase_often(k: u32, j: u32, ray: Ray) -> vec3f {
+    return often_of(k, j, ray) / max(frame.albedo[j].xyz, vec3f(1e-6));
+}
+
 // Gathers one layer of extinction `sigma` [1/m]. `pick` says at which boundary it ends; the last layer ends where the
-// march does. `p` is the layer's phase function for each light. The end is looked for where the last sample's layers
+// march does. `p` is the phase function of layer `j` for each light. The end is looked for where the last sample's layers
 // say it is, and corrected once by what is found there. Several samples lie at (i/n)^2 of the way through the layer.
 fn gather_layer(
     m: ptr<function, March>,
@@ -151,6 +171,7 @@ fn gather_layer(
     layers: Layers,
     sigma: vec3f,
     pick: Pick,
+    j: u32,
     p: vec4f,
 ) -> vec3f {
     let n_v = max(ray.cos_eye, 1e-3);
@@ -169,21 +190,21 @@ fn gather_layer(
         let s = Stretch(next, share * share, bottoms, a0, a0 + (next - t) * sigma);
         var got = follow(0u, ray, s, layers, (*m).beam0);
         (*m).beam0 = got.beam;
-        sum += p.x * got.light;
+        sum += (p.x + phase_often(0u, j, ray)) * got.light;
         if LIGHT_COUNT > 1u {
             got = follow(1u, ray, s, layers, (*m).beam1);
             (*m).beam1 = got.beam;
-            sum += p.y * got.light;
+            sum += (p.y + phase_often(1u, j, ray)) * got.light;
         }
         if LIGHT_COUNT > 2u {
             got = follow(2u, ray, s, layers, (*m).beam2);
             (*m).beam2 = got.beam;
-            sum += p.z * got.light;
+            sum += (p.z + phase_often(2u, j, ray)) * got.light;
         }
         if LIGHT_COUNT > 3u {
             got = follow(3u, ray, s, layers, (*m).beam3);
             (*m).beam3 = got.beam;
-            sum += p.w * got.light;
+            sum += (p.w + phase_often(3u, j, ray)) * got.light;
         }
         (*m).t = next;
         (*m).a = s.a1;
@@ -212,7 +233,7 @@ fn advance(k: u32, ray: Ray, step: Step, layers: Layers, last: Beam) -> Advanced
     var next = turned(k, ray, step.t, last);
     let way = way_under(ray.cover, next.facing, step.t, step.blend);
     next.depth = light_depth(way, step.bottoms, layers);
-    let sources = sources_of(last.phases);
+    let sources = with_often(k, ray, sources_of(last.phases));
     var got: Gathered;
     if QUADRATURE == 2u {
         got = gather_at_start(step.segment, last.depth, step.below, sources);
@@ -322,6 +343,15 @@ fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let soft = normalize(pixel.relief + pixel.normal);
     let wrap = frame.wrap * vec3f(1.0, 0.42, 0.30);
     let color = mix(deep, pixel.outer.rgb, pixel.outer.a);
-    radiance += frame.multiple_scattering * color * diffuse(pixel.world, soft, wrap, through) / PI;
+    if OFTEN == 0u {
+        radiance += frame.multiple_scattering * color * diffuse(pixel.world, soft, wrap, through) / PI;
+        return shown(radiance, at);
+    }
+    radiance += color * ambient(soft) / PI;
+    let tint = mix(vec3f(1.0), color / NEUTRAL_COLOR, frame.color_blend);
+    for (var k = 0u; k < LIGHT_COUNT; k += 1u) {
+        radiance += frame.multiple_scattering * tint * frame.leaked.xyz
+            * diffuse_of(k, pixel.world, soft, frame.around.xyz, through);
+    }
     return shown(radiance, at);
 }

@@ -305,6 +305,10 @@ fn mirrors() -> Vec<Mirror> {
                 lights,
                 extinction,
                 albedo,
+                reflectance,
+                kept,
+                around,
+                leaked,
                 through,
                 size,
                 inner,
@@ -327,8 +331,8 @@ fn mirrors() -> Vec<Mirror> {
                 noise_m,
                 noise_lookups,
                 exposure,
+                room_light,
                 pad0,
-                pad1,
             }
         ),
         mirror!(

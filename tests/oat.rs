@@ -419,7 +419,7 @@ fn shrunk(gpu: &Gpu, scale: f32, volume: f32, sets: &[&str]) -> Vec<Vec4> {
     let opacity = |x| if (x / 64) % 2 == 0 { 40 } else { 160 };
     let maps = maps(opacity, stripes, 20);
     let passes = draw_muscle(gpu, &mesh, &points, scale, volume, &maps, &all);
-    vectors(gpu, &passes.radiance)
+    vectors(gpu, &passes.target)
 }
 
 #[test]

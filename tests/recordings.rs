@@ -133,7 +133,7 @@ fn a_pass_left_out_or_another_tissue_is_found() {
         messages(&output)
     };
     let told = set("recorded-unshadowed", "light.0.shadow=false");
-    assert!(told.contains("differs: frame-0044.png"), "{told}");
+    assert!(told.contains("differs: frame-0066.png"), "{told}");
     assert!(!told.contains("differs: states"), "{told}");
     let told = set("recorded-stiffer", "solver.youngs_modulus_pa=6600");
     assert!(told.contains("differs: states"), "{told}");

@@ -16,7 +16,7 @@ use palpate::optics::light_entry;
 use palpate::optics::light_plane::{PlanePair, way_to_light};
 use palpate::optics::light_quadric::{self, Aim, Bend};
 use palpate::optics::march::{Cover, Ray, Rule, march, printed_reach_m, reach_m};
-use palpate::optics::{Layer, blur, film, layers, medium, pack, stack, tone};
+use palpate::optics::{Layer, blur, film, layers, medium, multiple, pack, stack, tone};
 use palpate::passes::draw::Output;
 use palpate::passes::draw::Target;
 use palpate::passes::frame::FramePasses;
@@ -528,6 +528,49 @@ fn film_parity_check_rejects_a_roughness_that_is_not_squared() {
         "let a = roughness;",
     );
     assert!(film_difference(&gpu(), &source) > 0.1);
+}
+
+// Light scattered more than once.
+
+fn often_difference(gpu: &Gpu, source: &str) -> f32 {
+    // to the light, to the eye, cosines | r0 | around
+    let cases = cases(|n| {
+        let three =
+            |n: &mut Numbers, high: f32| Vec3::from_array([(); 3].map(|()| n.between(0.0, high)));
+        [
+            Vec4::new(n.between(-1.0, 1.0), n.next(), 0.0, 0.0),
+            three(n, 0.95).extend(0.0),
+            three(n, 1.0).extend(0.0),
+            Vec4::ZERO,
+        ]
+    });
+    let twin: Vec<Vec4> = cases
+        .iter()
+        .map(|[a, b, c, _]| multiple::often(a.x, a.y, b.truncate(), c.truncate()).extend(0.0))
+        .collect();
+    let body = "results[i] = vec4f(often(a.x, a.y, b.xyz, c.xyz), 0.0);";
+    // What is a hundredth of the brightest or less is a difference of numbers near one.
+    worst(&call(gpu, source, body, &cases), &twin, 1e-2)
+}
+
+#[test]
+fn multiple_scattering_matches_the_cpu_twin() {
+    let difference = often_difference(&gpu(), &join(wgsl!["multiple.wgsl"]));
+    assert!(difference < 1e-3, "differ by {difference}");
+}
+
+#[test]
+fn multiple_scattering_parity_check_rejects_a_lost_cosine_and_the_first_order() {
+    let gpu = gpu();
+    let source = join(wgsl!["multiple.wgsl"]);
+    for (from, to) in [
+        ("(0.5 - r0 * c)", "(0.5 - r0)"),
+        ("(both - 1.0)", "both"),
+        ("/ (1.0 + around)", ""),
+    ] {
+        let difference = often_difference(&gpu, &sabotaged(&source, from, to));
+        assert!(difference > 0.02, "{to} went unnoticed: {difference}");
+    }
 }
 
 // Packed directions.

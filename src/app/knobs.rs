@@ -2,14 +2,17 @@
 
 use super::green_knobs as green;
 use super::panel::PanelAsk;
+use crate::optics::OpticalTissue;
 use crate::scene::{
-    InnerLight, InnerTaps, Noise, Quadrature, SurfaceKind, SurfaceSection, UvMetric,
+    InnerLight, InnerTaps, Multiple, Noise, Quadrature, SurfaceKind, SurfaceSection, UvMetric,
 };
 use egui::{ComboBox, Slider, Ui};
 
 /// Shows the knobs of the surface's own kind; returns what a change needs.
 pub fn surface(ui: &mut Ui, surface: &mut SurfaceSection) -> Option<PanelAsk> {
     let before = surface.clone();
+    tissue(ui, surface);
+    let named = surface.clone();
     match surface.kind {
         SurfaceKind::Plain => {}
         SurfaceKind::Subsurface => subsurface(ui, surface),
@@ -39,12 +42,16 @@ pub fn surface(ui: &mut Ui, surface: &mut SurfaceSection) -> Option<PanelAsk> {
     ui.add(Slider::new(&mut surface.roughness, 0.05..=0.8).text("roughness"));
     ui.add(Slider::new(&mut surface.wetness, 0.0..=2.0).text("wetness"));
     ui.add(Slider::new(&mut surface.exposure, 0.1..=4.0).text("exposure"));
+    if surface.layers != named.layers {
+        surface.tissue = None;
+    }
     let rebuilt = |s: &SurfaceSection| {
         (
             (s.samples, s.quadrature, s.blur_passes, s.light_map_size_px),
             (s.uv_metric, s.thickness_follows_volume),
             (s.inner.len(), s.inner_taps, s.inner_light),
             (s.layer_shadow > 0.0, s.noise),
+            (s.tissue, s.layers.len(), s.multiple),
             green::rebuilt(s),
         )
     };
@@ -74,6 +81,29 @@ fn choice<T: Copy + PartialEq, const N: usize>(
         });
 }
 
+/// The tissue whose measured coefficients fill the layers.
+fn tissue(ui: &mut Ui, surface: &mut SurfaceSection) {
+    let reads_layers = matches!(
+        surface.kind,
+        SurfaceKind::Subsurface | SurfaceKind::Absorption | SurfaceKind::Diffusion
+    );
+    if !reads_layers {
+        return;
+    }
+    let before = surface.tissue;
+    let name = |tissue: Option<OpticalTissue>| tissue.map_or("layers as set", OpticalTissue::name);
+    ComboBox::from_label("tissue")
+        .selected_text(name(before))
+        .show_ui(ui, |ui| {
+            for choice in std::iter::once(None).chain(OpticalTissue::ALL.map(Some)) {
+                ui.selectable_value(&mut surface.tissue, choice, name(choice));
+            }
+        });
+    if surface.tissue != before {
+        surface.take_tissue();
+    }
+}
+
 fn subsurface(ui: &mut Ui, surface: &mut SurfaceSection) {
     ui.add(Slider::new(&mut surface.samples, 1..=50).text("samples"));
     let name = |quadrature| match quadrature {
@@ -98,6 +128,17 @@ fn subsurface(ui: &mut Ui, surface: &mut SurfaceSection) {
             .text("deepest layer [m]"),
     );
     ui.add(Slider::new(&mut surface.color_blend, 0.0..=1.0).text("colour of the maps"));
+    let multiple = |multiple| match multiple {
+        Multiple::Wrapped => "of the maps' colour, wrapped",
+        Multiple::Calibrated => "of the layers",
+    };
+    choice(
+        ui,
+        "scattered often",
+        &mut surface.multiple,
+        [Multiple::Wrapped, Multiple::Calibrated],
+        multiple,
+    );
     ui.add(Slider::new(&mut surface.multiple_scattering, 0.0..=3.0).text("multiple scattering"));
     ui.add(Slider::new(&mut surface.wrap, 0.0..=1.0).text("wrap"));
     let noise = |noise| match noise {

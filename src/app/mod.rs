@@ -32,7 +32,9 @@ pub use renderer::Renderer;
 pub use replay::{ReplayOptions, replay};
 pub use session::{Marker, Session, Tick};
 pub use still::Still;
-pub use validate::{ReferenceScene, ValidateOptions, folder_scenes, read_reference, validate};
+pub use validate::{
+    ReferenceScene, ValidateOptions, folder_scenes, read_full_reference, read_reference, validate,
+};
 pub use window::{WindowOptions, window};
 
 use crate::measure::versus::{TimedRun, told};

@@ -100,6 +100,27 @@ pub fn scores(picture: Picture<'_>, reference: &Reference) -> Scores {
     }
 }
 
+/// RMS of the difference between `picture` and `reference` over RMS of the reference, with the variance of a reference
+/// whose pixels have the standard errors `noise` taken out.
+///
+/// # Panics
+///
+/// Unless all are of one size.
+pub fn rel_rmse_beyond_noise(picture: Picture<'_>, reference: &Reference, noise: &[f32]) -> f64 {
+    assert_eq!(picture.size, reference.size, "pictures of one size");
+    assert_eq!(picture.rgb.len(), noise.len(), "an error for each number");
+    let inner = eroded(&reference.mask, reference.size);
+    let (mut difference, mut square) = (0.0, 0.0);
+    for (i, (&test, &exact)) in picture.rgb.iter().zip(&reference.rgb).enumerate() {
+        if inner[i / 3] {
+            let (test, exact) = (f64::from(test), f64::from(exact));
+            difference += (test - exact).powi(2) - f64::from(noise[i]).powi(2);
+            square += exact * exact;
+        }
+    }
+    (difference.max(0.0) / square.max(1e-300)).sqrt()
+}
+
 /// Pixels whose four neighbours are in the mask too; those at the edge of the picture have none beyond it.
 pub fn eroded(mask: &[bool], [width, height]: [usize; 2]) -> Vec<bool> {
     (0..mask.len())
@@ -181,6 +202,25 @@ mod tests {
         let scored = of(&brighter);
         assert!((scored.rel_rmse - 0.1).abs() < 1e-6 && (scored.bias - 0.1).abs() < 1e-6);
         assert!(scored.rel_rmse_after_gain < 1e-6 && scored.flip > 0.01);
+    }
+
+    #[test]
+    fn noise_of_the_reference_is_no_error_and_a_gain_is_one() {
+        let clean = ball().rgb;
+        let mut reference = ball();
+        for (i, v) in reference.rgb.iter_mut().enumerate() {
+            *v += if i % 2 == 0 { 0.01 } else { -0.01 };
+        }
+        let size = reference.size;
+        let error = |rgb: &[f32], noise: f32| {
+            let noise = vec![noise; rgb.len()];
+            rel_rmse_beyond_noise(Picture { size, rgb }, &reference, &noise)
+        };
+        // Rounding of sums of squares.
+        assert!(error(&clean, 0.01) < 1e-3);
+        assert!(error(&clean, 0.0) > 0.05);
+        let brighter: Vec<f32> = clean.iter().map(|v| 1.2 * v).collect();
+        assert!((error(&brighter, 0.01) - 0.2).abs() < 0.03);
     }
 
     #[test]

@@ -27,6 +27,21 @@ pub fn mean_cosine(k: f32) -> f32 {
     (1.0 / k - (1.0 - k * k) / (2.0 * k * k) * ((1.0 + k) / (1.0 - k)).ln()) as f32
 }
 
+/// Schlick's k whose [`mean_cosine`] is `g`, from 0 to 0.9.
+pub fn asymmetry_of(g: f32) -> f32 {
+    let (mut low, mut high) = (0.0, 0.98);
+    // Each step halves what is left of an interval of length one: 1e-7.
+    for _ in 0..24 {
+        let middle = 0.5 * (low + high);
+        if mean_cosine(middle) < g {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
 /// Lengths of a path of `s` [m] in each layer, from the surface inwards, at an angle of `cosine` with the
 /// normal; `bottoms` are the lower boundaries of the first three layers [m], ascending.
 ///
@@ -167,6 +182,14 @@ mod tests {
             let mean = over_sphere(k, |cosine| -cosine);
             let error = (mean - f64::from(mean_cosine(k))).abs();
             assert!(error < 1e-3, "k {k}: {mean} against {}", mean_cosine(k));
+        }
+    }
+
+    #[test]
+    fn asymmetry_gives_back_the_mean_cosine_it_was_made_for() {
+        for g in [0.0, 0.2, 0.474, 0.9] {
+            // Near 0 the series takes over, with a step of 2e-6.
+            assert!((mean_cosine(asymmetry_of(g)) - g).abs() < 1e-5, "{g}");
         }
     }
 

@@ -13,11 +13,15 @@ pub mod light_plane;
 pub mod light_quadric;
 pub mod march;
 pub mod medium;
+pub mod multiple;
 pub mod noise;
 pub mod pack;
 pub mod stack;
+mod tissue;
 pub mod tone;
 pub mod wrap_lookup;
+
+pub use tissue::{Measured, OpticalTissue};
 
 use glam::Vec3;
 

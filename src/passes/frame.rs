@@ -138,6 +138,13 @@ pub fn effective_method(scene: &Scene) -> Option<LightPathMethod> {
     (scene.surface.kind == SurfaceKind::Subsurface).then_some(scene.light_path.method)
 }
 
+/// Radius of a ball as thick as a body at rest [m]; `None` of a sheet, which has no other side.
+fn thick_as_m(rest: &RestBox) -> Option<f32> {
+    let extent = rest.high - rest.low;
+    let thin = extent.min_element();
+    (thin > 1e-3 * extent.max_element()).then_some(0.5 * thin)
+}
+
 /// All passes of one scene and what they draw into.
 pub struct FramePasses {
     /// The mesh on the GPU.
@@ -168,6 +175,8 @@ pub struct FramePasses {
     frame: wgpu::Buffer,
     lights: Vec<PlacedLight>,
     knobs: SurfaceSection,
+    /// Radius of a ball as thick as the body [m]; `None` of a sheet.
+    thick_as_m: Option<f32>,
     uv_per_m: f32,
     map_size_px: u32,
     size: [u32; 2],
@@ -391,6 +400,7 @@ impl FramePasses {
             frame,
             lights,
             knobs: scene.surface.clone(),
+            thick_as_m: thick_as_m(rest),
             uv_per_m,
             map_size_px: tissue.size_px,
             size,
@@ -531,6 +541,10 @@ impl FramePasses {
             &self.knobs,
             shadow_from_world,
         );
+        let frame = match self.thick_as_m {
+            Some(radius_m) => frame.leaking(&self.knobs, radius_m),
+            None => frame,
+        };
         gpu.queue
             .write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
         self.mesh.upload(gpu, points);

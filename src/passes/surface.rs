@@ -8,7 +8,9 @@ use super::light_path::CoverKind;
 use super::maps::{LEVELS, Maps};
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join};
 use crate::optics::LAYERS;
-use crate::scene::{InnerLight, InnerTaps, Noise, Quadrature, SurfaceKind, SurfaceSection};
+use crate::scene::{
+    InnerLight, InnerTaps, Multiple, Noise, Quadrature, SurfaceKind, SurfaceSection,
+};
 
 /// What a surface reads, made by other passes.
 pub struct SurfaceInputs<'a> {
@@ -65,6 +67,7 @@ impl Surface {
                     "light.wgsl",
                     "pixel.wgsl",
                     "medium.wgsl",
+                    "multiple.wgsl",
                     "layers_four.wgsl",
                     "light_plane.wgsl",
                     "noise.wgsl",
@@ -78,6 +81,7 @@ impl Surface {
                     "light.wgsl",
                     "pixel.wgsl",
                     "medium.wgsl",
+                    "multiple.wgsl",
                     "layers_four.wgsl",
                     "light_entry.wgsl",
                     "light_depth.wgsl",
@@ -92,6 +96,7 @@ impl Surface {
                     "light.wgsl",
                     "pixel.wgsl",
                     "medium.wgsl",
+                    "multiple.wgsl",
                     "layers_four.wgsl",
                     "light_quadric.wgsl",
                     "noise.wgsl",
@@ -216,6 +221,10 @@ impl Surface {
                 ),
                 ("LAYER_COUNT", section.layers.len() as f64),
                 ("NOISE", noise),
+                (
+                    "OFTEN",
+                    f64::from(u8::from(section.multiple == Multiple::Calibrated)),
+                ),
             ]);
             if inputs.cover == CoverKind::Planes && section.quadrature == Quadrature::Published {
                 constants.push(("MIRRORED", 1.0));

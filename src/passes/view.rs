@@ -2,6 +2,7 @@
 
 use super::maps::level_for;
 use crate::optics::LAYERS_MAX;
+use crate::optics::multiple::{Leak, reflectance};
 use crate::scene::{
     INNER_MAX, InnerSection, LIGHTS_MAX, PlacedLight, RestBox, Scene, SurfaceSection,
 };
@@ -120,6 +121,10 @@ pub struct FrameUniform {
     pub lights: [LightUniform; LIGHTS_MAX],
     pub extinction: [[f32; 4]; LAYERS_MAX],
     pub albedo: [[f32; 4]; LAYERS_MAX],
+    pub reflectance: [[f32; 4]; LAYERS_MAX],
+    pub kept: [f32; 4],
+    pub around: [f32; 4],
+    pub leaked: [f32; 4],
     pub through: [f32; 4],
     pub size: [f32; 4],
     pub inner: [[f32; 4]; INNER_MAX],
@@ -142,8 +147,8 @@ pub struct FrameUniform {
     pub noise_m: f32,
     pub noise_lookups: u32,
     pub exposure: f32,
+    pub room_light: f32,
     pub pad0: f32,
-    pub pad1: f32,
 }
 
 /// The lights of a scene, the one that casts shadows first.
@@ -221,6 +226,10 @@ impl FrameUniform {
             extinction: layers
                 .map(|layer| layer.extinction_per_m().extend(layer.asymmetry).to_array()),
             albedo: layers.map(|layer| layer.albedo().extend(0.0).to_array()),
+            reflectance: layers.map(|layer| reflectance(&layer).extend(0.0).to_array()),
+            kept: Leak::NONE.kept.extend(0.0).to_array(),
+            around: Leak::NONE.around.extend(0.0).to_array(),
+            leaked: Leak::NONE.radiance.extend(0.0).to_array(),
             through: deepest.diffuse_attenuation_per_m().extend(0.0).to_array(),
             size: [width, height, 1.0 / width, 1.0 / height],
             inner: inner.map(|layer| {
@@ -247,8 +256,22 @@ impl FrameUniform {
             noise_m: surface.noise_m,
             noise_lookups: surface.noise_lookups,
             exposure: surface.exposure,
+            room_light: surface.room_light,
             pad0: 0.0,
-            pad1: 0.0,
+        }
+    }
+}
+
+impl FrameUniform {
+    /// The same for a body as thick as a ball of `radius_m` [m], round whose terminator light leaks.
+    pub fn leaking(self, surface: &SurfaceSection, radius_m: f32) -> Self {
+        let layers = surface.repeated_layers();
+        let leak = Leak::of(&layers[surface.layers.len().max(1) - 1], radius_m);
+        Self {
+            kept: leak.kept.extend(0.0).to_array(),
+            around: leak.around.extend(0.0).to_array(),
+            leaked: leak.radiance.extend(0.0).to_array(),
+            ..self
         }
     }
 }

@@ -6,7 +6,7 @@
 //! common with the solvers, so that tests and studies can hold those to it.
 //!
 //! [`Rays`] is a surface to cast rays at, and [`EvenTissue`] sums the light along them: the answer that light paths
-//! below a deformed surface are held to.
+//! below a deformed surface are held to. [`walked`] is light of all orders, which surfaces are held to.
 //!
 //! Sources: Smith, de Goes, Kim, "Stable Neo-Hookean Flesh Simulation", ACM TOG 37, 2018 (energy);
 //! Nocedal, Wright, "Numerical Optimization", 2006, ch. 3 (line search, shifted Hessian); Hairer,
@@ -20,6 +20,7 @@ mod newton;
 mod rays;
 mod sparse;
 mod statics;
+mod walk;
 
 pub use dynamics::{State, Swing};
 pub use fem::{Fem, FemSetup};
@@ -27,6 +28,7 @@ pub use glow::EvenTissue;
 pub use material::Material;
 pub use rays::{HalfLine, Rays, all_by};
 pub use statics::{NoEquilibrium, Statics};
+pub use walk::{WalkTissue, Walked, walked};
 
 #[cfg(test)]
 mod tests;

@@ -169,6 +169,11 @@ impl Scene {
                 *ramp = folder.join(&*ramp);
             }
         }
+        let told: toml::Table = toml::from_str(source.text).unwrap_or_default();
+        let surface = told.get("surface").and_then(toml::Value::as_table);
+        if surface.is_none_or(|surface| !surface.contains_key("layer")) {
+            scene.surface.take_tissue();
+        }
         let scene = overrides::apply(source.name, scene, sets)?;
         scene.check(source.name)?;
         Ok(scene)

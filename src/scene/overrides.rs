@@ -35,6 +35,9 @@ pub(super) fn apply(name: &str, scene: Scene, sets: &[String]) -> Result<Scene, 
             }
             scene.body.file = scene.body.file.map(|file| from_here(&file));
         }
+        if path == "surface.tissue" {
+            scene.surface.take_tissue();
+        }
         if path == "body.shape" {
             scene.body.file = None;
             scene.body.maps = None;

@@ -3,7 +3,7 @@
 use super::check::Checker;
 use super::gooey::{INNER_MAX, InnerLight, InnerSection, InnerTaps, Noise};
 use super::green::{AbsorptionSection, DiffusionSection, LookupSection};
-use crate::optics::{LAYERS_MAX, Layer};
+use crate::optics::{LAYERS_MAX, Layer, OpticalTissue};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -20,14 +20,19 @@ pub struct SurfaceSection {
     pub quadrature: Quadrature,
     /// `subsurface`: depth that the value 1 of the layer texture stands for [m].
     pub layer_depth_max_m: f32,
+    /// A tissue by name, whose measured coefficients fill the layers. Layers that the scene gives itself win.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tissue: Option<OpticalTissue>,
     /// `subsurface`: one to eight layers, outermost first; the last goes on below its boundary.
     #[serde(rename = "layer")]
     pub layers: Vec<LayerSection>,
     /// `subsurface`: how far the colour textures tint the layers (Norberg 2010, 5.1), 0 to 1.
     pub color_blend: f32,
-    /// `subsurface`: strength of light that scattered more than once, as a wrapped diffuse term.
+    /// `subsurface`: where light that scattered more than once comes from.
+    pub multiple: Multiple,
+    /// `subsurface`: strength of that light.
     pub multiple_scattering: f32,
-    /// How far that diffuse light reaches round the terminator, 0 to 1.
+    /// How far wrapped light reaches round the terminator, 0 to 1.
     pub wrap: f32,
     /// `subsurface`: what moves the places where the march reads the layers, against bands (Norberg 2010, 3.1.2).
     pub noise: Noise,
@@ -65,6 +70,8 @@ pub struct SurfaceSection {
     pub roughness: f32,
     /// Strength of reflections on the wet film.
     pub wetness: f32,
+    /// Multiplies the light of the room that falls on the tissue; what the film mirrors stays.
+    pub room_light: f32,
     /// Multiplies radiance before the tone curve.
     pub exposure: f32,
     /// `wrap` and `absorption`: the table of wrapped light.
@@ -147,6 +154,17 @@ pub enum Quadrature {
     ByLayer,
 }
 
+/// Light that scattered more than once.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum Multiple {
+    /// The colour of the maps, lit round the terminator.
+    #[default]
+    Wrapped,
+    /// From the coefficients of the layers, in closed form; from the maps only what the room lights.
+    Calibrated,
+}
+
 /// One layer of tissue.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize, PartialEq)]
 #[serde(deny_unknown_fields)]
@@ -169,6 +187,16 @@ impl From<LayerSection> for Layer {
     }
 }
 
+impl From<Layer> for LayerSection {
+    fn from(layer: Layer) -> Self {
+        Self {
+            absorption_per_m: layer.absorption_per_m.to_array(),
+            scattering_per_m: layer.scattering_per_m.to_array(),
+            asymmetry: layer.asymmetry,
+        }
+    }
+}
+
 impl Default for SurfaceSection {
     fn default() -> Self {
         let layer = |absorption_per_m, scattering_per_m, asymmetry| LayerSection {
@@ -181,6 +209,7 @@ impl Default for SurfaceSection {
             samples: 4,
             quadrature: Quadrature::default(),
             layer_depth_max_m: 0.006,
+            tissue: None,
             // Ratios between the colours as published for blood-rich tissue; all of it about six
             // times clearer, so that what lies below shows at the distance of a whole organ.
             layers: vec![
@@ -190,6 +219,7 @@ impl Default for SurfaceSection {
                 layer([75.0, 1000.0, 1250.0], [250.0, 270.0, 290.0], 0.4),
             ],
             color_blend: 0.7,
+            multiple: Multiple::default(),
             multiple_scattering: 1.0,
             wrap: 0.35,
             noise: Noise::default(),
@@ -210,6 +240,7 @@ impl Default for SurfaceSection {
             relief: 1.0,
             roughness: 0.24,
             wetness: 1.0,
+            room_light: 1.0,
             exposure: 1.0,
             lookup: LookupSection::default(),
             absorption: AbsorptionSection::default(),
@@ -219,6 +250,13 @@ impl Default for SurfaceSection {
 }
 
 impl SurfaceSection {
+    /// Fills the layers with those of the tissue that is named; nothing if none is.
+    pub fn take_tissue(&mut self) {
+        if let Some(tissue) = self.tissue {
+            self.layers = tissue.layers().map(LayerSection::from).to_vec();
+        }
+    }
+
     /// Whether light that comes through the body is drawn, so that depth maps are needed.
     pub fn is_translucent(&self) -> bool {
         match self.kind {
@@ -268,6 +306,13 @@ impl SurfaceSection {
         );
         for (index, layer) in self.layers.iter().enumerate() {
             let key = |name: &str| format!("surface.layer.{index}.{name}");
+            if self.multiple == Multiple::Calibrated && layer.asymmetry < 0.0 {
+                c.problem(
+                    &key("asymmetry"),
+                    "it is below 0: light that is scattered backwards has no closed form here; set it to 0 or more, or \
+                     surface.multiple to \"wrapped\"",
+                );
+            }
             c.range3(&key("absorption_per_m"), layer.absorption_per_m, 0.0, 1e6);
             c.range3(&key("scattering_per_m"), layer.scattering_per_m, 0.0, 1e6);
             c.range(&key("asymmetry"), layer.asymmetry, -0.98, 0.98);
@@ -293,6 +338,7 @@ impl SurfaceSection {
             ("outer_opacity", self.outer_opacity, 4.0),
             ("relief", self.relief, 4.0),
             ("wetness", self.wetness, 4.0),
+            ("room_light", self.room_light, 10.0),
             ("exposure", self.exposure, 100.0),
         ] {
             c.range(&format!("surface.{name}"), value, 0.0, high);
@@ -329,5 +375,70 @@ impl SurfaceSection {
             32.0,
             4096.0,
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::optics::OpticalTissue;
+    use crate::scene::{LayerSection, Scene, SceneSource};
+
+    fn scene(surface: &str, sets: &[&str]) -> Result<Scene, String> {
+        let text =
+            format!("[body]\nshape = \"slab\"\nextent_m = [1.0, 1.0, 1.0]\n[surface]\n{surface}");
+        let source = SceneSource {
+            name: "test",
+            text: &text,
+            folder: None,
+        };
+        let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
+        Scene::read(&source, &sets).map_err(|error| error.to_string())
+    }
+
+    fn layers_of(tissue: OpticalTissue) -> Vec<LayerSection> {
+        tissue.layers().map(LayerSection::from).to_vec()
+    }
+
+    #[test]
+    fn a_named_tissue_fills_the_layers_unless_the_scene_gives_its_own() {
+        let spleen = scene("tissue = \"spleen\"", &[]).expect("a scene");
+        assert_eq!(spleen.surface.layers, layers_of(OpticalTissue::Spleen));
+        let layer = "[[surface.layer]]\nabsorption_per_m = [1.0, 2.0, 3.0]\n\
+                     scattering_per_m = [4.0, 5.0, 6.0]\nasymmetry = 0.1";
+        let own = scene(&format!("tissue = \"spleen\"\n{layer}"), &[]).expect("a scene");
+        assert_eq!(own.surface.layers.len(), 1);
+        // What is told on the command line is told last.
+        let told = scene(layer, &["surface.tissue=fat"]).expect("a scene");
+        assert_eq!(told.surface.layers, layers_of(OpticalTissue::Fat));
+        let saved = told.to_toml().expect("it has a TOML form");
+        let text = saved.as_str();
+        let source = SceneSource {
+            name: "saved",
+            text,
+            folder: None,
+        };
+        assert_eq!(Scene::read(&source, &[]).expect("it reads back"), told);
+    }
+
+    #[test]
+    fn an_unknown_tissue_is_answered_with_the_known_ones() {
+        for told in [
+            scene("tissue = \"tofu\"", &[]),
+            scene("", &["surface.tissue=tofu"]),
+        ] {
+            let message = told.expect_err("there is no such tissue");
+            assert!(message.contains("tofu"), "{message}");
+            for tissue in OpticalTissue::ALL {
+                assert!(message.contains(tissue.name()), "{message}");
+            }
+        }
+    }
+
+    #[test]
+    fn light_scattered_backwards_has_no_calibrated_form() {
+        let layer = "multiple = \"calibrated\"\n[[surface.layer]]\nabsorption_per_m = [1.0, 2.0, 3.0]\n\
+                     scattering_per_m = [4.0, 5.0, 6.0]\nasymmetry = -0.1";
+        let message = scene(layer, &[]).expect_err("it is refused");
+        assert!(message.contains("surface.layer.0.asymmetry"), "{message}");
     }
 }

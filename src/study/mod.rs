@@ -24,6 +24,7 @@ mod shard;
 mod solver;
 mod stability;
 mod stretch;
+mod surfaces;
 mod sweep;
 mod table2;
 mod timing;
@@ -41,6 +42,7 @@ use solver::Solver;
 use stability::Stability;
 use std::path::{Path, PathBuf};
 use stretch::Stretch;
+use surfaces::Surfaces;
 use table2::Table2;
 
 /// Version and commit, as rows are marked with.
@@ -54,6 +56,8 @@ pub enum Study {
     Planes,
     /// How far the march below the surface is off, by quadrature and samples.
     March,
+    /// Every surface against light of all orders, and what it costs.
+    Surfaces,
     /// François' Table 2, on surfaces of our own.
     Table2,
     /// How deep layers seem where the surface is stretched.
@@ -70,9 +74,10 @@ pub enum Study {
 
 impl Study {
     /// Every study.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Planes,
         Self::March,
+        Self::Surfaces,
         Self::Table2,
         Self::Stretch,
         Self::Minimal,
@@ -86,6 +91,7 @@ impl Study {
         match self {
             Self::Planes => "planes",
             Self::March => "march",
+            Self::Surfaces => "surfaces",
             Self::Table2 => "table2",
             Self::Stretch => "stretch",
             Self::Minimal => "minimal",
@@ -105,6 +111,7 @@ impl Study {
         match self {
             Self::Planes => "Light below a moving surface: time a frame against error",
             Self::March => "The march below the surface: time against error",
+            Self::Surfaces => "Every surface: time against error",
             Self::Table2 => "The published table of frame rates",
             Self::Stretch => "Layers under stretch",
             Self::Minimal => "What each feature costs and changes",
@@ -118,6 +125,7 @@ impl Study {
         match self {
             Self::Planes => run::run::<Planes>(options),
             Self::March => run::run::<March>(options),
+            Self::Surfaces => run::run::<Surfaces>(options),
             Self::Table2 => run::run::<Table2>(options),
             Self::Stretch => run::run::<Stretch>(options),
             Self::Minimal => run::run::<Minimal>(options),
@@ -131,6 +139,7 @@ impl Study {
         match self {
             Self::Planes => merge::merge::<Planes>(out, parts),
             Self::March => merge::merge::<March>(out, parts),
+            Self::Surfaces => merge::merge::<Surfaces>(out, parts),
             Self::Table2 => merge::merge::<Table2>(out, parts),
             Self::Stretch => merge::merge::<Stretch>(out, parts),
             Self::Minimal => merge::merge::<Minimal>(out, parts),
@@ -144,6 +153,7 @@ impl Study {
         match self {
             Self::Planes => output::section::<Planes>(out),
             Self::March => output::section::<March>(out),
+            Self::Surfaces => output::section::<Surfaces>(out),
             Self::Table2 => output::section::<Table2>(out),
             Self::Stretch => output::section::<Stretch>(out),
             Self::Minimal => output::section::<Minimal>(out),

@@ -12,6 +12,7 @@ use palpate::scene::Scene;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+use std::sync::OnceLock;
 
 /// Threads of the simulation.
 const THREADS: usize = 2;
@@ -82,7 +83,7 @@ impl Studio {
             size,
             sets: HashMap::new(),
             shots: HashMap::new(),
-            split: split_layers(),
+            split: split_layers().clone(),
         }
     }
 
@@ -182,7 +183,13 @@ fn motion_of(scene: &Scene) -> String {
 }
 
 /// The layers of the liver, each cut into two, as textures of four each.
-fn split_layers() -> [PathBuf; 2] {
+fn split_layers() -> &'static [PathBuf; 2] {
+    // Once: tests that run side by side would write the same files.
+    static FILES: OnceLock<[PathBuf; 2]> = OnceLock::new();
+    FILES.get_or_init(written_layers)
+}
+
+fn written_layers() -> [PathBuf; 2] {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
     let bytes = read_file(&manifest.join("scenes/textures/liver-layers.png")).expect("a texture");
     let layers: DynamicImage = image::load_from_memory(&bytes).expect("a picture");

@@ -5,15 +5,16 @@ mod scene;
 mod score;
 
 pub use scene::ReferenceScene;
-pub use score::reference as read_reference;
+pub use score::{full_reference as read_full_reference, reference as read_reference};
 
 use super::{AppError, Outcome, Still, VERSION_COMMIT, VERSION_NUMBER};
 use crate::gpu::Gpu;
 use crate::measure::files::{create_folder, write, write_npy};
 use crate::measure::page::{Block, Page, Section, Table};
+use crate::measure::radiance::{Picture, rel_rmse_beyond_noise};
 use crate::measure::stats::Stats;
-use crate::scene::SurfaceSection;
-use score::{Goals, Scored};
+use crate::scene::{Multiple, SurfaceSection};
+use score::{FullErrors, Goals, Scored};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -117,14 +118,58 @@ fn rendered(
         &[u64::from(height), u64::from(width), 3],
         &rgb,
     )?;
+    let full = full_errors(gpu, scene, &rgb, out)?;
     let median = |values: Vec<f32>| Stats::of(values).map(|stats| stats.p50);
     Ok(Scored {
         name: scene.name.clone(),
         scores: score::scores(scene, &rgb)?,
         goal: goals.of(&scene.name),
+        full,
         surface_ms: median(surface_ms),
         frame_ms: median(frame_ms),
     })
+}
+
+/// How far the picture `once` is from light of all orders, and one with what scattered more often, which is written into
+/// `full` below `out`; `None` where there is no such reference.
+fn full_errors(
+    gpu: &Gpu,
+    scene: &ReferenceScene,
+    once: &[f32],
+    out: &Path,
+) -> Result<Option<FullErrors>, AppError> {
+    let Some((reference, noise)) = score::full_reference(scene)? else {
+        return Ok(None);
+    };
+    let mut often = scene.scene.clone();
+    often.surface.multiple = Multiple::Calibrated;
+    often.surface.multiple_scattering = 1.0;
+    let mut still = Still::new(
+        gpu,
+        &often,
+        &scene.mesh,
+        &scene.maps,
+        scene.view,
+        scene.size,
+    )?;
+    still.draw()?;
+    let rgb = still.radiance()?;
+    let folder = out.join("full");
+    create_folder(&folder)?;
+    let [width, height] = scene.size;
+    write_npy(
+        &folder.join(format!("{}.npy", scene.name)),
+        &[u64::from(height), u64::from(width), 3],
+        &rgb,
+    )?;
+    let error = |rgb: &[f32]| {
+        let size = scene.size.map(|side| side as usize);
+        rel_rmse_beyond_noise(Picture { size, rgb }, &reference, &noise)
+    };
+    Ok(Some(FullErrors {
+        once: error(once),
+        calibrated: error(&rgb),
+    }))
 }
 
 fn write_all(
@@ -159,7 +204,9 @@ fn write_all(
         title: "Radiance against reference pictures".to_owned(),
         subtitle: format!("palpate {VERSION_NUMBER} ({VERSION_COMMIT}), {adapter}"),
         lead: "Light that is scattered once, rendered by the passes of a frame without film, room light and tone \
-               map, against reference pictures. Errors are relative RMS over the object less its outermost pixels."
+               map, against reference pictures. Errors are relative RMS over the object less its outermost pixels. The columns \
+               \"all\" compare with light of all orders, less the noise of that reference: light scattered once, and with \
+               what scattered more often from the coefficients of the layers."
             .to_owned(),
         figures: Vec::new(),
         sections: vec![Section {

@@ -30,6 +30,7 @@ kind = "subsurface"
 samples = 8
 color_blend = 0.0
 multiple_scattering = 0.0
+room_light = 0.0
 wetness = 0.0
 relief = 0.0
 [light_path]

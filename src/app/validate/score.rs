@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 /// Heads of the table.
-pub const HEAD: [&str; 11] = [
+pub const HEAD: [&str; 13] = [
     "scene",
     "relRMSE",
     "bias",
@@ -19,6 +19,8 @@ pub const HEAD: [&str; 11] = [
     "vein",
     "cover px",
     "not finite",
+    "all: once",
+    "all: calibrated",
     "surface ms",
     "frame ms",
     "goal",
@@ -77,22 +79,72 @@ impl Goals {
 ///
 /// [`AppError::Usage`] naming the file and what is wrong with it.
 pub fn reference(scene: &ReferenceScene) -> Result<Option<Reference>, AppError> {
-    let path = &scene.reference;
-    let bytes = match std::fs::read(path) {
-        Ok(bytes) => bytes,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(source) => {
-            return Err(AppError::Read {
-                path: path.display().to_string(),
-                source,
-            });
-        }
+    let Some(arrays) = Arrays::of(scene)? else {
+        return Ok(None);
     };
-    let wrong = |problem: String| AppError::Usage(format!("{}: {problem}", path.display()));
-    let names = npz::names(&bytes).map_err(wrong)?;
-    let [width, height] = scene.size.map(u64::from);
-    let picture = |name: &str, shape: &[u64]| {
-        let array = npz::read(&bytes, name).map_err(wrong)?;
+    let without_veins = if arrays.has("single_noveins") {
+        Some(arrays.rgb("single_noveins")?)
+    } else {
+        None
+    };
+    Ok(Some(Reference {
+        without_veins,
+        ..arrays.reference("single")?
+    }))
+}
+
+/// The reference picture of light of all orders and the standard error of each of its numbers; `None` if there is none.
+///
+/// # Errors
+///
+/// As [`reference`].
+pub fn full_reference(scene: &ReferenceScene) -> Result<Option<(Reference, Vec<f32>)>, AppError> {
+    let arrays = Arrays::of(scene)?.filter(|arrays| arrays.has("full") && arrays.has("full_se"));
+    arrays
+        .map(|arrays| Ok((arrays.reference("full")?, arrays.rgb("full_se")?)))
+        .transpose()
+}
+
+/// The arrays of a scene's reference file.
+struct Arrays<'a> {
+    scene: &'a ReferenceScene,
+    bytes: Vec<u8>,
+    names: Vec<String>,
+}
+
+impl<'a> Arrays<'a> {
+    fn of(scene: &'a ReferenceScene) -> Result<Option<Self>, AppError> {
+        let path = &scene.reference;
+        let bytes = match std::fs::read(path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            Err(source) => {
+                return Err(AppError::Read {
+                    path: path.display().to_string(),
+                    source,
+                });
+            }
+        };
+        let names = npz::names(&bytes)
+            .map_err(|problem| AppError::Usage(format!("{}: {problem}", path.display())))?;
+        Ok(Some(Self {
+            scene,
+            bytes,
+            names,
+        }))
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.names.iter().any(|known| known == name)
+    }
+
+    fn values(&self, name: &str, channels: &[u64]) -> Result<Vec<f32>, AppError> {
+        let wrong = |problem: String| {
+            AppError::Usage(format!("{}: {problem}", self.scene.reference.display()))
+        };
+        let [width, height] = self.scene.size.map(u64::from);
+        let shape = [&[height, width], channels].concat();
+        let array = npz::read(&self.bytes, name).map_err(wrong)?;
         if array.shape == shape {
             Ok(array.values)
         } else {
@@ -101,22 +153,21 @@ pub fn reference(scene: &ReferenceScene) -> Result<Option<Reference>, AppError> 
                 array.shape
             )))
         }
-    };
-    let rgb_shape = [height, width, 3];
-    let without_veins = if names.iter().any(|name| name == "single_noveins") {
-        Some(picture("single_noveins", &rgb_shape)?)
-    } else {
-        None
-    };
-    Ok(Some(Reference {
-        size: [width as usize, height as usize],
-        rgb: picture("single", &rgb_shape)?,
-        mask: picture("mask", &[height, width])?
-            .iter()
-            .map(|v| *v > 0.5)
-            .collect(),
-        without_veins,
-    }))
+    }
+
+    fn rgb(&self, name: &str) -> Result<Vec<f32>, AppError> {
+        self.values(name, &[3])
+    }
+
+    fn reference(&self, name: &str) -> Result<Reference, AppError> {
+        let mask = self.values("mask", &[])?;
+        Ok(Reference {
+            size: self.scene.size.map(|side| side as usize),
+            rgb: self.rgb(name)?,
+            mask: mask.iter().map(|v| *v > 0.5).collect(),
+            without_veins: None,
+        })
+    }
 }
 
 /// How far the picture `rgb` of `scene` is from its reference; `None` if there is none.
@@ -129,6 +180,15 @@ pub fn scores(scene: &ReferenceScene, rgb: &[f32]) -> Result<Option<Scores>, App
     Ok(reference(scene)?.map(|reference| radiance::scores(Picture { size, rgb }, &reference)))
 }
 
+/// Errors against light of all orders, relative RMS less the reference's own noise.
+#[derive(Clone, Copy, Debug)]
+pub struct FullErrors {
+    /// Of light scattered once.
+    pub once: f64,
+    /// With what scattered more often from the medium.
+    pub calibrated: f64,
+}
+
 /// A scene that was rendered.
 #[derive(Debug)]
 pub struct Scored {
@@ -136,6 +196,8 @@ pub struct Scored {
     /// `None` without a reference.
     pub scores: Option<Scores>,
     pub goal: Option<Goal>,
+    /// `None` without a reference of all orders.
+    pub full: Option<FullErrors>,
     /// GPU time of the surface, and of the whole frame [ms].
     pub surface_ms: Option<f64>,
     pub frame_ms: Option<f64>,
@@ -195,6 +257,8 @@ impl Scored {
                 .map_or("-".to_owned(), |s| s.coverage_mismatch_px.to_string()),
             self.scores
                 .map_or("-".to_owned(), |s| s.nonfinite_px.to_string()),
+            told(self.full.map(|full| full.once)),
+            told(self.full.map(|full| full.calibrated)),
             told(self.surface_ms),
             told(self.frame_ms),
             format!("{}{goal}", self.verdict()),
@@ -222,6 +286,10 @@ impl Scored {
                 "relRMSE": goal.rel_rmse, "FLIP": goal.flip, "vein": goal.vein,
             })),
             "verdict": self.verdict(),
+            "full": self.full.map(|full| json!({
+                "relRMSE_once": finite(full.once),
+                "relRMSE_calibrated": finite(full.calibrated),
+            })),
             "surface_ms_p50": self.surface_ms,
             "frame_ms_p50": self.frame_ms,
         })
