@@ -1,5 +1,6 @@
 //! Arrays of NumPy's `.npz` archives.
 
+use half::f16;
 use npyz::NpyFile;
 use std::io::{Cursor, Read};
 
@@ -91,6 +92,10 @@ fn floats(file: NpyFile<&[u8]>) -> Result<Vec<f32>, String> {
         Ok(data) => return all(data, |v| v as f32),
         Err(file) => file,
     };
+    let file = match file.try_data::<f16>() {
+        Ok(data) => return all(data, f16::to_f32),
+        Err(file) => file,
+    };
     let file = match file.try_data::<u8>() {
         Ok(data) => return all(data, f32::from),
         Err(file) => file,
@@ -98,7 +103,7 @@ fn floats(file: NpyFile<&[u8]>) -> Result<Vec<f32>, String> {
     match file.try_data::<bool>() {
         Ok(data) => all(data, |v| f32::from(u8::from(v))),
         Err(_) => Err(format!(
-            "its numbers are {dtype}; save them as float32, float64, uint8 or bool"
+            "its numbers are {dtype}; save them as float16, float32, float64, uint8 or bool"
         )),
     }
 }
@@ -106,6 +111,20 @@ fn floats(file: NpyFile<&[u8]>) -> Result<Vec<f32>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_of_sixteen_bits_are_read() {
+        let text = "{'descr': '<f2', 'fortran_order': False, 'shape': (2,), }";
+        let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+        bytes.extend(format!("{text:<117}\n").bytes());
+        bytes.extend(
+            [1.5_f32, -0.25]
+                .map(f16::from_f32)
+                .map(f16::to_le_bytes)
+                .concat(),
+        );
+        assert_eq!(array(&bytes).unwrap().values, [1.5, -0.25]);
+    }
 
     #[test]
     fn what_is_no_archive_and_what_claims_too_much_is_told() {
