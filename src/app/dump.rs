@@ -109,12 +109,12 @@ fn description(session: &Session, renderer: &Renderer, fitted: bool) -> serde_js
         fov_y: orbit.fov_y,
     };
     let method = effective_method(scene);
-    let meaning = match method {
-        Some(LightPathMethod::Quadric) => QUADRIC,
-        Some(LightPathMethod::Stale) => STALE,
-        Some(LightPathMethod::Carried) => CARRIED,
-        _ if fitted => FITTED,
-        _ => TANGENT,
+    let (columns, meaning) = match method {
+        Some(LightPathMethod::Quadric) => (&QUADRIC_COLUMNS[..], QUADRIC),
+        Some(LightPathMethod::Stale) => (&PLANE_COLUMNS[..], STALE),
+        Some(LightPathMethod::Carried) => (&PLANE_COLUMNS[..], CARRIED),
+        _ if fitted => (&PLANE_COLUMNS[..], FITTED),
+        _ => (&PLANE_COLUMNS[..], TANGENT),
     };
     let [width, height] = renderer.size();
     let aspect = width as f32 / height as f32;
@@ -155,7 +155,7 @@ fn description(session: &Session, renderer: &Renderer, fitted: bool) -> serde_js
             "radius_m": fitted.then(|| patch_radius_m(scene)),
         },
         "primitives": {
-            "columns": if meaning == QUADRIC { &QUADRIC_COLUMNS[..] } else { &PLANE_COLUMNS[..] },
+            "columns": columns,
             "meaning": meaning,
             "patch": "the points within radius_m of the point in rest_positions whose rest normals are not opposed (dot > 0), at least the 16 nearest; membership is symmetric; each point counts once though it may have several vertices (point_of)",
         },

@@ -620,7 +620,7 @@ impl Shown {
         for ask in asks {
             self.answer(ask);
         }
-        self.fit_picture()?;
+        self.fit_picture();
         let repaint_soon = output
             .viewport_output
             .values()
@@ -644,7 +644,7 @@ impl Shown {
     }
 
     /// Makes the picture as large as the place it is shown in.
-    fn fit_picture(&mut self) -> Result<(), AppError> {
+    fn fit_picture(&mut self) {
         let size = [self.view_px[2], self.view_px[3]];
         if self.renderer.size() != size {
             self.renderer.resize(size);
@@ -653,7 +653,6 @@ impl Shown {
                 self.reset_camera();
             }
         }
-        Ok(())
     }
 
     fn show_new_picture(&mut self) {

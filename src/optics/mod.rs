@@ -16,6 +16,8 @@ pub mod medium;
 pub mod multiple;
 pub mod noise;
 pub mod pack;
+#[cfg(test)]
+mod photon;
 pub mod stack;
 mod tissue;
 pub mod tone;

@@ -1,11 +1,12 @@
-//! What render passes share: a pipeline with one bind group, made from a list of bindings.
+//! What render passes share: a pipeline with its bind group, made from a list of bindings, or with several to choose from.
 
 use crate::gpu::{Binding, Gpu, GpuError, Wgsl, bind, compile};
 
 /// A render pipeline and what it binds. Immutable once made.
 pub struct Draw {
     pipeline: wgpu::RenderPipeline,
-    bindings: wgpu::BindGroup,
+    /// At least one.
+    sets: Vec<wgpu::BindGroup>,
 }
 
 /// What kind of pipeline a [`Draw`] is.
@@ -82,14 +83,28 @@ impl Draw {
     ///
     /// [`GpuError::Shader`] if the WGSL does not compile, [`GpuError::Pass`] if it does not fit.
     pub fn new(gpu: &Gpu, kind: &DrawKind<'_>, bindings: &[Binding<'_>]) -> Result<Self, GpuError> {
+        Self::with_sets(gpu, kind, &[bindings.to_vec()])
+    }
+
+    /// Compiles the pipeline with several `sets` of bindings of the same kinds; each frame takes one as group 0.
+    ///
+    /// # Errors
+    ///
+    /// As [`Draw::new`].
+    ///
+    /// # Panics
+    ///
+    /// If there is no set.
+    pub fn with_sets(
+        gpu: &Gpu,
+        kind: &DrawKind<'_>,
+        sets: &[Vec<Binding<'_>>],
+    ) -> Result<Self, GpuError> {
         let module = compile(gpu, kind.pass, kind.parts, kind.source)?;
         let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let (layout, group) = bind(
-            gpu,
-            kind.pass,
-            wgpu::ShaderStages::VERTEX_FRAGMENT,
-            bindings,
-        );
+        let (layout, first) = bind_draw(gpu, kind.pass, &sets[0]);
+        let mut groups = vec![first];
+        groups.extend(bound(gpu, kind.pass, &sets[1..]));
         let pipeline_layout = gpu
             .device
             .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -164,7 +179,7 @@ impl Draw {
         match pollster::block_on(scope.pop()) {
             None => Ok(Self {
                 pipeline,
-                bindings: group,
+                sets: groups,
             }),
             Some(error) => Err(GpuError::Pass {
                 pass: kind.pass,
@@ -173,22 +188,40 @@ impl Draw {
         }
     }
 
-    /// Makes `pass` use this pipeline and its bindings.
-    pub fn set(&self, pass: &mut wgpu::RenderPass<'_>) {
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &self.bindings, &[]);
+    /// Takes other things in place of those that it binds: as many sets, of the same kinds, from [`bound`].
+    pub fn rebind(&mut self, sets: Vec<wgpu::BindGroup>) {
+        self.sets = sets;
     }
 
-    /// Makes `pass` use this pipeline with other `bindings` of the same kinds, from [`bound`].
-    pub fn set_bound(&self, pass: &mut wgpu::RenderPass<'_>, bindings: &wgpu::BindGroup) {
+    /// Makes `pass` use this pipeline and its bindings.
+    pub fn set(&self, pass: &mut wgpu::RenderPass<'_>) {
+        self.set_with(pass, 0);
+    }
+
+    /// The same with the set of that number.
+    ///
+    /// # Panics
+    ///
+    /// If there is none.
+    pub fn set_with(&self, pass: &mut wgpu::RenderPass<'_>, number: usize) {
         pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, bindings, &[]);
+        pass.set_bind_group(0, &self.sets[number], &[]);
     }
 }
 
-/// What a [`Draw`] binds.
-pub fn bound(gpu: &Gpu, label: &str, bindings: &[Binding<'_>]) -> wgpu::BindGroup {
-    bind(gpu, label, wgpu::ShaderStages::VERTEX_FRAGMENT, bindings).1
+/// What a [`Draw`] binds, one after another.
+pub fn bound(gpu: &Gpu, label: &str, sets: &[Vec<Binding<'_>>]) -> Vec<wgpu::BindGroup> {
+    sets.iter()
+        .map(|set| bind_draw(gpu, label, set).1)
+        .collect()
+}
+
+fn bind_draw(
+    gpu: &Gpu,
+    label: &str,
+    bindings: &[Binding<'_>],
+) -> (wgpu::BindGroupLayout, wgpu::BindGroup) {
+    bind(gpu, label, wgpu::ShaderStages::VERTEX_FRAGMENT, bindings)
 }
 
 /// A texture that is drawn to and then read, with its view.

@@ -30,7 +30,7 @@ use crate::geom::paint::TissueMaps;
 use crate::geom::patch::radius_from_extinction_m;
 use crate::geom::plane::{LightPathMethod, skip_from_optical_depth_m};
 use crate::gpu::{Gpu, GpuError, Timer, uniform};
-use crate::scene::{PlacedLight, RestBox, Scene, SurfaceKind, SurfaceSection};
+use crate::scene::{Multiple, PlacedLight, RestBox, Scene, SurfaceKind, SurfaceSection};
 use glam::{Mat4, Vec3};
 
 /// Light that is left at the radius of a patch: ε of François 2006, section 2.2.
@@ -175,7 +175,7 @@ pub struct FramePasses {
     frame: wgpu::Buffer,
     lights: Vec<PlacedLight>,
     knobs: SurfaceSection,
-    /// Radius of a ball as thick as the body [m]; `None` of a sheet.
+    /// Radius of a ball as thick as the body [m]; `None` of a sheet, and where nothing leaks.
     thick_as_m: Option<f32>,
     uv_per_m: f32,
     map_size_px: u32,
@@ -400,7 +400,7 @@ impl FramePasses {
             frame,
             lights,
             knobs: scene.surface.clone(),
-            thick_as_m: thick_as_m(rest),
+            thick_as_m: thick_as_m(rest).filter(|_| scene.surface.multiple == Multiple::Calibrated),
             uv_per_m,
             map_size_px: tissue.size_px,
             size,
@@ -421,8 +421,8 @@ impl FramePasses {
             exit.resize(gpu, size);
         }
         let constants = light_constants(&self.lights);
-        let bindings = self.surface.bound(gpu, &self.surface_inputs(&constants));
-        self.surface.rebind(bindings);
+        let sets = self.surface.bound(gpu, &self.surface_inputs(&constants));
+        self.surface.rebind(sets);
         self.size = size;
     }
 

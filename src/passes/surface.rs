@@ -40,9 +40,8 @@ pub struct SurfaceInputs<'a> {
 pub struct Surface {
     kind: SurfaceKind,
     output: Output,
+    /// With a set of bindings for each level of the maps.
     draw: Draw,
-    /// What the model binds at each level of the maps.
-    bindings: [wgpu::BindGroup; LEVELS],
 }
 
 impl Surface {
@@ -236,7 +235,7 @@ impl Surface {
         if section.kind == SurfaceKind::Absorption {
             constants.extend(Green::constants(section));
         }
-        let draw = Draw::new(
+        let draw = Draw::with_sets(
             gpu,
             &DrawKind {
                 pass: section.kind.name(),
@@ -250,24 +249,23 @@ impl Surface {
                 cull: None,
                 constants: &constants,
             },
-            &bindings(inputs, 0),
+            &sets(inputs),
         )?;
         Ok(Self {
             kind: section.kind,
             output,
             draw,
-            bindings: bound_levels(gpu, section.kind, inputs),
         })
     }
 
     /// What the model binds to read from `inputs` of another size than before, for [`Surface::rebind`].
-    pub fn bound(&self, gpu: &Gpu, inputs: &SurfaceInputs<'_>) -> [wgpu::BindGroup; LEVELS] {
-        bound_levels(gpu, self.kind, inputs)
+    pub fn bound(&self, gpu: &Gpu, inputs: &SurfaceInputs<'_>) -> Vec<wgpu::BindGroup> {
+        bound(gpu, self.kind.name(), &sets(inputs))
     }
 
     /// Takes what [`Surface::bound`] made.
-    pub fn rebind(&mut self, bindings: [wgpu::BindGroup; LEVELS]) {
-        self.bindings = bindings;
+    pub fn rebind(&mut self, sets: Vec<wgpu::BindGroup>) {
+        self.draw.rebind(sets);
     }
 
     /// Name in logs.
@@ -294,7 +292,7 @@ impl Surface {
             timestamp_writes: timer.render(self.name()),
             ..Default::default()
         });
-        self.draw.set_bound(&mut pass, &self.bindings[level]);
+        self.draw.set_with(&mut pass, level);
         pass.draw(0..3, 0..1);
     }
 }
@@ -320,12 +318,9 @@ fn gooey_constants(section: &SurfaceSection) -> [(&'static str, f64); 4] {
     ]
 }
 
-fn bound_levels(
-    gpu: &Gpu,
-    kind: SurfaceKind,
-    inputs: &SurfaceInputs<'_>,
-) -> [wgpu::BindGroup; LEVELS] {
-    std::array::from_fn(|level| bound(gpu, kind.name(), &bindings(inputs, level)))
+/// The bindings at each level of the maps.
+fn sets<'a>(inputs: &SurfaceInputs<'a>) -> Vec<Vec<Binding<'a>>> {
+    (0..LEVELS).map(|level| bindings(inputs, level)).collect()
 }
 
 /// The bindings of `shaders/pixel.wgsl`, in its order, with the maps at `level`, and of `shaders/light_depth.wgsl` or `shaders/green.wgsl`.

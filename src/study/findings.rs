@@ -1,5 +1,6 @@
 //! What a study shows: text and tables for the terminal, the same with charts for the report.
 
+use crate::measure::chart::three_digits;
 use crate::measure::page::{Block, Section};
 
 /// What the rows of a study say.
@@ -32,6 +33,11 @@ impl Findings {
             blocks: self.blocks,
         }
     }
+}
+
+/// A number of a table to three digits; a dash where nothing was measured.
+pub fn told(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".to_owned(), three_digits)
 }
 
 /// `text` in lines of a width that reads well.

@@ -4,8 +4,8 @@
 //! reference scenes are at hand. All are drawn by the passes of a frame.
 
 use super::Study;
-use super::findings::Findings;
-use super::sweep::{Cost, Row, State, Sweep, Verdict, finite};
+use super::findings::{Findings, told};
+use super::sweep::{Cost, Row, Sweep, Verdict, finite};
 use crate::app::{AppError, ReferenceScene, Still, folder_scenes, load_scene, read_reference};
 use crate::geom::SurfaceMesh;
 use crate::geom::lattice::sphere;
@@ -505,13 +505,8 @@ fn off(got: &[f32], exact: &[f32]) -> (f64, f64) {
 }
 
 fn verdict(measures: &Measures) -> Verdict {
-    let percent = |error: f64| format!("{:.1} % off", 100.0 * error);
-    Verdict::of(match measures.radiance_error_rel {
-        None => vec![(State::Failed, "radiance is not finite".to_owned())],
-        Some(error) if error > DEGRADED => vec![(State::Failed, percent(error))],
-        Some(error) if error > FINE => vec![(State::Degraded, percent(error))],
-        Some(_) => Vec::new(),
-    })
+    let told = |error| format!("{:.1} % off", 100.0 * error);
+    Verdict::of_radiance(measures.radiance_error_rel, [FINE, DEGRADED], told)
 }
 
 fn quadrature_name(quadrature: Quadrature) -> &'static str {
@@ -523,7 +518,6 @@ fn quadrature_name(quadrature: Quadrature) -> &'static str {
 }
 
 fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
-    let told = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), three_digits);
     let head = [
         "scene",
         "quadrature",

@@ -4,12 +4,11 @@
 //! a single feature the other way. What changes nothing should be off.
 
 use super::Study;
-use super::findings::Findings;
+use super::findings::{Findings, told};
 use super::sweep::{Cost, Row, State, Sweep, Verdict, finite};
 use crate::app::{AppError, Renderer, Session, load_scene};
 use crate::geom::plane::LightPathMethod;
 use crate::gpu::Gpu;
-use crate::measure::chart::three_digits;
 use crate::measure::page::{Block, Table};
 use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
 use crate::measure::stats::Stats;
@@ -510,7 +509,6 @@ fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
         "pixels %",
     ];
     let line = |row: &&Row<Cell, Measures>| {
-        let told = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), three_digits);
         let percent = |value: Option<f64>| told(value.map(|v| 100.0 * v));
         let m = &row.measures;
         vec![

@@ -5,13 +5,13 @@
 //! pixel is read back and compared with the geometry.
 
 use super::Study;
-use super::findings::Findings;
+use super::findings::{Findings, told};
 use super::sweep::{Cost, Row, State, Sweep, Verdict, finite};
 use crate::app::{AppError, load_scene};
 use crate::geom::SurfaceMesh;
 use crate::geom::paint::TissueMaps;
 use crate::gpu::{Gpu, Timer, read_texture_rgba16f, read_texture_words};
-use crate::measure::chart::{number, three_digits};
+use crate::measure::chart::number;
 use crate::measure::page::{Block, Table};
 use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
 use crate::measure::stats::Stats;
@@ -301,7 +301,7 @@ fn verdict(measures: &Measures) -> Verdict {
 }
 
 fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
-    let told =
+    let percent =
         |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{:+.1}", 100.0 * v));
     let head = [
         "surface",
@@ -325,11 +325,11 @@ fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
             }
             .to_owned(),
             number(row.cell.stretch),
-            told(row.measures.depth_error_rel),
-            told(row.measures.depth_across_error_rel),
-            told(row.measures.blur_error_rel),
-            told(row.measures.thickness_error_rel),
-            row.cost.ms_p50.map_or_else(|| "-".to_owned(), three_digits),
+            percent(row.measures.depth_error_rel),
+            percent(row.measures.depth_across_error_rel),
+            percent(row.measures.blur_error_rel),
+            percent(row.measures.thickness_error_rel),
+            told(row.cost.ms_p50),
         ]
     };
     let svg = chart(rows).svg();

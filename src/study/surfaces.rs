@@ -5,8 +5,8 @@
 //! smallest. There is neither room light nor film.
 
 use super::Study;
-use super::findings::Findings;
-use super::sweep::{Cost, Row, State, Sweep, Verdict, finite};
+use super::findings::{Findings, told};
+use super::sweep::{Cost, Row, Sweep, Verdict, finite};
 use crate::app::{AppError, ReferenceScene, Still, folder_scenes, load_scene, read_full_reference};
 use crate::geom::SurfaceMesh;
 use crate::geom::lattice::sphere;
@@ -14,7 +14,6 @@ use crate::geom::paint::TissueMaps;
 use crate::geom::plane::LightPathMethod;
 use crate::geom::unwrap::unwrap;
 use crate::gpu::Gpu;
-use crate::measure::chart::three_digits;
 use crate::measure::page::{Block, Table};
 use crate::measure::radiance::eroded;
 use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
@@ -23,6 +22,8 @@ use crate::optics::diffusion::mean_distance_m;
 use crate::optics::multiple::reflectance;
 use crate::optics::tone::srgb_from_linear;
 use crate::optics::{Layer, OpticalTissue};
+use crate::passes::geometry::Geometry;
+use crate::passes::tangents::Tangents;
 use crate::passes::view::View;
 use crate::reference::{HalfLine, Rays, WalkTissue, walked};
 use crate::scene::{LightSection, Multiple, Quadrature, Scene, SurfaceKind};
@@ -45,7 +46,7 @@ const DEGRADED: f64 = 0.3;
 const DIM: f64 = 0.25;
 const CHART_PX: (f64, f64) = (560.0, 340.0);
 /// Passes that every surface has.
-const SHARED_PASSES: [&str; 3] = ["tangents", "geometry", "tonemap"];
+const SHARED_PASSES: [&str; 2] = [Tangents::NAME, Geometry::NAME];
 /// How deep a march may go that ends by itself [m].
 const DEEPEST_M: f32 = 1.0;
 
@@ -563,18 +564,12 @@ fn off(got: &[f32], oracle: &Oracle) -> Off {
 }
 
 fn verdict(measures: &Measures) -> Verdict {
-    let percent = |error: f64| format!("{:.0} % off", 100.0 * error);
-    let error = measures.absolute_error_rel.or(measures.picture_error_rel);
-    Verdict::of(match error {
-        None => vec![(State::Failed, "radiance is not finite".to_owned())],
-        Some(error) if error > DEGRADED => vec![(State::Failed, percent(error))],
-        Some(error) if error > FINE => vec![(State::Degraded, percent(error))],
-        Some(_) => Vec::new(),
-    })
+    let error_rel = measures.absolute_error_rel.or(measures.picture_error_rel);
+    let told = |error| format!("{:.0} % off", 100.0 * error);
+    Verdict::of_radiance(error_rel, [FINE, DEGRADED], told)
 }
 
 fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
-    let told = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), three_digits);
     let head = [
         "scene",
         "surface",
@@ -610,8 +605,8 @@ fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
         svg: sheet(&charts, CHART_PX, 2),
         blocks: vec![
             Block::Paragraph(
-                "Every surface against light of all orders, over the GPU time of what it draws at 800 × 600 beyond geometry \
-                 and tone map. Errors are after the one factor that makes them smallest; those of `subsurface` without it \
+                "Every surface against light of all orders, over the GPU time of what it draws at 800 × 600 beyond tangents \
+                 and geometry. Errors are after the one factor that makes them smallest; those of `subsurface` without it \
                  stand in the table."
                     .to_owned(),
             ),

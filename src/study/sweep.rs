@@ -132,6 +132,20 @@ impl Verdict {
             why: reasons.join("; "),
         }
     }
+
+    /// The verdict of one relative error: fine up to the first of `limits`, degraded up to the second; `told` says it.
+    pub fn of_radiance(
+        error_rel: Option<f64>,
+        [fine, degraded]: [f64; 2],
+        told: impl Fn(f64) -> String,
+    ) -> Self {
+        Self::of(match error_rel {
+            None => vec![(State::Failed, "radiance is not finite".to_owned())],
+            Some(error) if error > degraded => vec![(State::Failed, told(error))],
+            Some(error) if error > fine => vec![(State::Degraded, told(error))],
+            Some(_) => Vec::new(),
+        })
+    }
 }
 
 /// The JSON of a cell, by which it is known in part files and messages.

@@ -4,7 +4,7 @@
 //! graphics card of 2006, stand beside ours. What can be compared are ratios.
 
 use super::Study;
-use super::findings::Findings;
+use super::findings::{Findings, told};
 use super::march::evaluations;
 use super::sweep::{Cost, Row, Sweep, Verdict};
 use crate::app::{AppError, Still, load_scene};
@@ -12,7 +12,6 @@ use crate::geom::SurfaceMesh;
 use crate::geom::paint::TissueMaps;
 use crate::geom::plane::LightPathMethod;
 use crate::gpu::Gpu;
-use crate::measure::chart::three_digits;
 use crate::measure::page::{Block, Table};
 use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
 use crate::measure::stats::Stats;
@@ -316,7 +315,6 @@ pub fn lobe(vertices: usize) -> SurfaceMesh {
 }
 
 fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
-    let told = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), three_digits);
     let of = |vertices: usize, quadrature: Quadrature, samples: u32| {
         rows.iter().find(move |row| {
             row.cell.vertices == vertices

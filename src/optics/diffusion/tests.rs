@@ -1,23 +1,17 @@
 //! Profiles against walks of photons, and the blur against what it must keep.
 
+use super::super::photon::Random;
 use super::*;
 
 /// Where photons of a thin beam come out of an even half-space, in mean free paths, with their weights.
 fn walks(albedo: f64, k: f64, photons: u32) -> Vec<(f64, f64)> {
-    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut random = move || {
-        // Source: Marsaglia, "Xorshift RNGs", Journal of Statistical Software 8, 2003.
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-    };
+    let mut random = Random::new();
     let mut out = Vec::new();
     for _ in 0..photons {
         let (mut at, mut along) = (glam::DVec3::ZERO, glam::DVec3::NEG_Z);
         let mut weight = 1.0;
         loop {
-            let next = at - random().ln() * along;
+            let next = at - random.next().ln() * along;
             if next.z > 0.0 {
                 let place = at + (next - at) * (at.z / (at.z - next.z));
                 out.push((place.truncate().length(), weight));
@@ -25,19 +19,11 @@ fn walks(albedo: f64, k: f64, photons: u32) -> Vec<(f64, f64)> {
             }
             at = next;
             weight *= albedo;
-            if weight < 0.1 {
-                if random() > weight / 0.1 {
-                    break;
-                }
-                weight = 0.1;
-            }
-            // Schlick's function, inverted: (2 u + k − 1) / (2 k u − k + 1).
-            let u = random();
-            let cosine = (2.0 * u + k - 1.0) / (2.0 * k * u - k + 1.0);
-            let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
-            let (b, c) = along.any_orthonormal_pair();
-            let around = std::f64::consts::TAU * random();
-            along = (cosine * along + sine * (around.cos() * b + around.sin() * c)).normalize();
+            let Some(survived) = random.survivor(weight) else {
+                break;
+            };
+            weight = survived;
+            along = random.scattered(along, k);
         }
     }
     out

@@ -1,5 +1,6 @@
 //! The closed form against walks of photons, and against what must not come out.
 
+use super::super::photon::Random;
 use super::*;
 use glam::DVec3;
 
@@ -16,14 +17,7 @@ fn layer(albedo: f32, k: f32) -> Layer {
 /// eye that look for the light wherever they scatter; `azimuth` lies between both.
 fn walked(albedo: f64, k: f64, cos_light: f64, cos_eye: f64, azimuth: f64) -> f64 {
     const WALKS: u32 = 12_000;
-    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut random = move || {
-        // Source: Marsaglia, "Xorshift RNGs", Journal of Statistical Software 8, 2003.
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        ((state >> 11) as f64 + 0.5) / (1u64 << 53) as f64
-    };
+    let mut random = Random::new();
     let sine = |c: f64| (1.0 - c * c).sqrt();
     let to_light = DVec3::new(
         sine(cos_light) * azimuth.cos(),
@@ -35,7 +29,7 @@ fn walked(albedo: f64, k: f64, cos_light: f64, cos_eye: f64, azimuth: f64) -> f6
         let (mut along, mut z) = (DVec3::new(-sine(cos_eye), 0.0, -cos_eye), 0.0);
         let mut weight = 1.0;
         for order in 0.. {
-            z -= random().ln() * along.z;
+            z -= random.next().ln() * along.z;
             if z > 0.0 {
                 break;
             }
@@ -45,17 +39,11 @@ fn walked(albedo: f64, k: f64, cos_light: f64, cos_eye: f64, azimuth: f64) -> f6
                 let phase = (1.0 - k * k) / (4.0 * std::f64::consts::PI * base * base);
                 sum += weight * phase * (z / cos_light).exp();
             }
-            if weight < 0.1 {
-                if random() > weight / 0.1 {
-                    break;
-                }
-                weight = 0.1;
-            }
-            let u = random();
-            let cosine = (2.0 * u + k - 1.0) / (2.0 * k * u - k + 1.0);
-            let (b, c) = along.any_orthonormal_pair();
-            let turn = std::f64::consts::TAU * random();
-            along = (cosine * along + sine(cosine) * (turn.cos() * b + turn.sin() * c)).normalize();
+            let Some(survived) = random.survivor(weight) else {
+                break;
+            };
+            weight = survived;
+            along = random.scattered(along, k);
         }
     }
     sum / f64::from(WALKS)

@@ -1,6 +1,6 @@
 //! Tables and charts of the study, from its rows alone.
 
-use super::super::findings::Findings;
+use super::super::findings::{Findings, told};
 use super::super::sweep::Row;
 use super::deform::Deformation;
 use super::{Cell, Measures};
@@ -356,7 +356,6 @@ fn costs(rows: &[PlanesRow]) -> Table {
     let line = |row: &&PlanesRow| {
         let measures = &row.measures;
         let ms = measures.refit_ms_p50;
-        let told = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), three_digits);
         let share = ms.zip(full_ms(row)).map(|(ms, full)| 100.0 * ms / full);
         vec![
             name_of(&[row]),
@@ -414,7 +413,6 @@ fn drifts(rows: &[PlanesRow]) -> Table {
         "p99 degrees",
     ];
     let line = |row: &PlanesRow| {
-        let told = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), three_digits);
         vec![
             row.cell.method.name().to_owned(),
             row.cell.frames.to_string(),

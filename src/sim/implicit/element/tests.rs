@@ -57,7 +57,10 @@ fn slope(at: &[DVec4], k: usize, value: impl Fn(&[DVec4]) -> f64) -> f64 {
 
 /// The kernel's force on corner and axis `k` [N], and its energy [J].
 fn kernel_forces(displacements: &[DVec4]) -> ([f64; 12], Strain) {
-    let (elements, _) = elements();
+    forces_of(&elements().0, displacements)
+}
+
+fn forces_of(elements: &Elements, displacements: &[DVec4]) -> ([f64; 12], Strain) {
     let mut forces = vec![Vec4::ZERO; 5];
     let strain = elements.forces(displacements, LAME, &mut forces);
     let force = |k: usize| f64::from(forces[k / 3][k % 3]);
@@ -78,22 +81,12 @@ fn pulled_energy_j(displacements: &[DVec4]) -> f64 {
     volume_m3 * SCALE.powi(3) * energy_density_pa(f * (1.0 / SCALE), LAME)
 }
 
-/// The kernel's forces [N], energy [J] and stiffness [N/m] of that muscle.
-fn pulled(displacements: &[DVec4]) -> ([f64; 12], Strain, [[f64; 12]; 12]) {
-    let (mut elements, mut matrix) = elements();
+/// That muscle.
+fn muscle() -> (Elements, BlockMatrix) {
+    let (mut elements, matrix) = elements();
     elements.set_activity(&[0.8; 4]);
     elements.shortening = SHORTENING;
-    let mut forces = vec![Vec4::ZERO; 5];
-    let strain = elements.forces(displacements, LAME, &mut forces);
-    elements.add_stiffness(displacements, LAME, &mut matrix);
-    matrix.mirror_upper();
-    let entry = |row: usize, column: usize| {
-        let place = matrix.place((row / 3) as u32, (column / 3) as u32) as usize;
-        f64::from(matrix.blocks()[place][column % 3][row % 3])
-    };
-    let stiffness = std::array::from_fn(|row| std::array::from_fn(|column| entry(row, column)));
-    let force = |k: usize| f64::from(forces[k / 3][k % 3]);
-    (std::array::from_fn(force), strain, stiffness)
+    (elements, matrix)
 }
 
 fn elements() -> (Elements, BlockMatrix) {
@@ -103,7 +96,13 @@ fn elements() -> (Elements, BlockMatrix) {
 
 /// The kernel's stiffness of the twelve coordinates [N/m].
 fn kernel_stiffness(displacements: &[DVec4]) -> [[f64; 12]; 12] {
-    let (elements, mut matrix) = elements();
+    stiffness_of(elements(), displacements)
+}
+
+fn stiffness_of(
+    (elements, mut matrix): (Elements, BlockMatrix),
+    displacements: &[DVec4],
+) -> [[f64; 12]; 12] {
     elements.add_stiffness(displacements, LAME, &mut matrix);
     matrix.mirror_upper();
     let entry = |row: usize, column: usize| {
@@ -161,11 +160,35 @@ const SQUASHED: DMat3 = DMat3::from_diagonal(DVec3::new(0.4, 1.0, 1.0));
 #[test]
 fn the_check_of_muscle_sees_a_shape_at_rest_that_stays() {
     let at = displaced(near(DMat3::IDENTITY, [0.0; 9]));
-    let (forces, ..) = pulled(&at);
+    let (forces, _) = forces_of(&muscle().0, &at);
     let still: Vec<f64> = (0..12).map(|k| slope(&at, k, energy_j)).collect();
     let scale = largest(&forces);
     let differs = (0..12).any(|k| (forces[k] + still[k]).abs() > 0.5 * scale);
     assert!(differs && scale > 0.0, "{forces:?} and {still:?}");
+}
+
+/// Fails unless forces are the slope of `energy_j`, and the energy is that.
+fn hold_forces_to_energy(
+    at: &[DVec4],
+    (forces, strain): ([f64; 12], Strain),
+    energy_j: fn(&[DVec4]) -> f64,
+) -> Result<(), TestCaseError> {
+    let slopes: Vec<f64> = (0..12).map(|k| slope(at, k, energy_j)).collect();
+    // A force of single precision is a sum of parts up to this, each off by 6e-8 a few times.
+    let scale = largest(&slopes).max(f64::from(LAME.lambda_pa) * 1e-4);
+    for k in 0..12 {
+        let error = (forces[k] + slopes[k]).abs() / scale;
+        prop_assert!(
+            error < 2e-5,
+            "coordinate {k}: {} not {}",
+            forces[k],
+            -slopes[k]
+        );
+    }
+    let energy = energy_j(at);
+    let full = f64::from(LAME.lambda_pa) * ELEMENT.shape(&REST).1;
+    prop_assert!((strain.energy_j - energy).abs() < 1e-5 * energy.abs().max(full));
+    Ok(())
 }
 
 proptest! {
@@ -174,17 +197,7 @@ proptest! {
         noise in prop::array::uniform9(-0.8..0.8),
     ) {
         let at = displaced(near(DMat3::IDENTITY, noise));
-        let (forces, strain) = kernel_forces(&at);
-        let slopes: Vec<f64> = (0..12).map(|k| slope(&at, k, energy_j)).collect();
-        // A force of single precision is a sum of parts up to this, each off by 6e-8 a few times.
-        let scale = largest(&slopes).max(f64::from(LAME.lambda_pa) * 1e-4);
-        for k in 0..12 {
-            let error = (forces[k] + slopes[k]).abs() / scale;
-            prop_assert!(error < 2e-5, "coordinate {k}: {} not {}", forces[k], -slopes[k]);
-        }
-        let energy = energy_j(&at);
-        let full = f64::from(LAME.lambda_pa) * ELEMENT.shape(&REST).1;
-        prop_assert!((strain.energy_j - energy).abs() < 1e-5 * energy.abs().max(full));
+        hold_forces_to_energy(&at, kernel_forces(&at), energy_j)?;
     }
 
     #[test]
@@ -207,17 +220,7 @@ proptest! {
         noise in prop::array::uniform9(-0.5..0.5),
     ) {
         let at = displaced(near(DMat3::IDENTITY, noise));
-        let (forces, strain, _) = pulled(&at);
-        let slopes: Vec<f64> = (0..12).map(|k| slope(&at, k, pulled_energy_j)).collect();
-        // As above.
-        let scale = largest(&slopes).max(f64::from(LAME.lambda_pa) * 1e-4);
-        for k in 0..12 {
-            let error = (forces[k] + slopes[k]).abs() / scale;
-            prop_assert!(error < 2e-5, "coordinate {k}: {} not {}", forces[k], -slopes[k]);
-        }
-        let energy = pulled_energy_j(&at);
-        let full = f64::from(LAME.lambda_pa) * ELEMENT.shape(&REST).1;
-        prop_assert!((strain.energy_j - energy).abs() < 1e-5 * energy.abs().max(full));
+        hold_forces_to_energy(&at, forces_of(&muscle().0, &at), pulled_energy_j)?;
     }
 
     #[test]
@@ -226,7 +229,7 @@ proptest! {
         noise in prop::array::uniform9(-0.003..0.003),
     ) {
         let at = displaced(near(SCALE * (1.0 + dilation) * DMat3::IDENTITY, noise));
-        let ours = pulled(&at).2;
+        let ours = stiffness_of(muscle(), &at);
         let right: [[f64; 12]; 12] = std::array::from_fn(|row| {
             std::array::from_fn(|column| {
                 slope(&at, row, |at| slope(at, column, pulled_energy_j))
