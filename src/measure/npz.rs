@@ -91,6 +91,10 @@ fn floats(file: NpyFile<&[u8]>) -> Result<Vec<f32>, String> {
         Ok(data) => return all(data, |v| v as f32),
         Err(file) => file,
     };
+    let file = match file.try_data::<half::f16>() {
+        Ok(data) => return all(data, f32::from),
+        Err(file) => file,
+    };
     let file = match file.try_data::<u8>() {
         Ok(data) => return all(data, f32::from),
         Err(file) => file,
@@ -98,7 +102,7 @@ fn floats(file: NpyFile<&[u8]>) -> Result<Vec<f32>, String> {
     match file.try_data::<bool>() {
         Ok(data) => all(data, |v| f32::from(u8::from(v))),
         Err(_) => Err(format!(
-            "its numbers are {dtype}; save them as float32, float64, uint8 or bool"
+            "its numbers are {dtype}; save them as float16, float32, float64, uint8 or bool"
         )),
     }
 }
@@ -106,6 +110,16 @@ fn floats(file: NpyFile<&[u8]>) -> Result<Vec<f32>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_of_half_precision_are_read() {
+        let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+        let text = "{'descr': '<f2', 'fortran_order': False, 'shape': (3,), }";
+        bytes.extend(format!("{text:<117}\n").bytes());
+        bytes.extend([0x00, 0x3c, 0x00, 0xc0, 0x00, 0x38]);
+        let array = array(&bytes).expect("an array");
+        assert_eq!((array.shape, array.values), (vec![3], vec![1.0, -2.0, 0.5]));
+    }
 
     #[test]
     fn what_is_no_archive_and_what_claims_too_much_is_told() {
