@@ -63,7 +63,7 @@ pub struct Plan {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BallPlan {
-    pub light: Vec<Side>,
+    pub light: Vec<LitFrom>,
     pub tissue: OpticalTissue,
     pub radius_m: f32,
     /// Random walks a pixel and colour.
@@ -73,13 +73,13 @@ pub struct BallPlan {
 /// Where the ball's light comes from, seen from the eye.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Side {
+pub enum LitFrom {
     Front,
     Side,
     Back,
 }
 
-impl Side {
+impl LitFrom {
     const ALL: [Self; 3] = [Self::Front, Self::Side, Self::Back];
 
     fn scene(self) -> &'static str {
@@ -215,7 +215,7 @@ impl Sweep for Surfaces {
         Plan {
             surface: Method::ALL.to_vec(),
             ball: BallPlan {
-                light: Side::ALL.to_vec(),
+                light: LitFrom::ALL.to_vec(),
                 tissue: OpticalTissue::Heart,
                 radius_m: 0.008,
                 walks: if quick { 12 } else { 96 },
@@ -336,7 +336,7 @@ struct Stage {
 impl Surfaces {
     fn stage(&self, cell: &Cell) -> Result<(Stage, Arc<Oracle>), AppError> {
         let Some(file) = &cell.file else {
-            let side = Side::ALL
+            let side = LitFrom::ALL
                 .into_iter()
                 .find(|side| side.scene() == cell.scene);
             let side = side.ok_or_else(|| AppError::Usage(format!("no scene {}", cell.scene)))?;
@@ -423,7 +423,7 @@ fn painted(maps: &TissueMaps, scene: &Scene) -> TissueMaps {
     }
 }
 
-fn ball(plan: &BallPlan, side: Side, method: Method) -> Result<Stage, AppError> {
+fn ball(plan: &BallPlan, side: LitFrom, method: Method) -> Result<Stage, AppError> {
     let mut scene = load_scene("slab", &[])?;
     let layer = plan.tissue.layer();
     scene.surface.layers = vec![layer.into()];
@@ -624,8 +624,8 @@ fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
     }
 }
 
-const ERROR_RANGE: (f64, f64) = (0.01, 10.0);
-const MS_RANGE: (f64, f64) = (0.5, 500.0);
+const ERROR_RANGE: (f64, f64) = (0.001, 10.0);
+const MS_RANGE: (f64, f64) = (1.0, 5000.0);
 
 fn chart(rows: &[Row<Cell, Measures>], scene: &str) -> ScatterChart {
     let cloud = |(look, method): (usize, Method)| Cloud {
