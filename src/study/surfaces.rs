@@ -619,8 +619,8 @@ fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
     }
 }
 
-const ERROR_RANGE: (f64, f64) = (0.01, 10.0);
-const MS_RANGE: (f64, f64) = (0.5, 500.0);
+const ERROR_RANGE: (f64, f64) = (0.001, 10.0);
+const MS_RANGE: (f64, f64) = (1.0, 5000.0);
 
 fn chart(rows: &[Row<Cell, Measures>], scene: &str) -> ScatterChart {
     let cloud = |(look, method): (usize, Method)| Cloud {
