@@ -102,7 +102,10 @@ fn taken(text: &str) -> Result<(f64, String), String> {
         .map_err(|error| format!("no lattice: {error}"))?;
     let weights = lattice.embedding.weights.iter().flatten();
     assert!(weights.chain(&lattice.masses_kg).all(|w| w.is_finite()));
-    Ok((1e6 * mesh.volume_m3(), surface.notes.join("; ")))
+    // None of these has texture coordinates.
+    let notes = surface.notes.into_iter();
+    let notes: Vec<String> = notes.filter(|note| !note.contains("texture")).collect();
+    Ok((1e6 * mesh.volume_m3(), notes.join("; ")))
 }
 
 /// Volume of [`ball`] [mL].
