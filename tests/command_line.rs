@@ -5,6 +5,10 @@ use std::process::{Command, Output};
 
 fn palpate(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .env(
+            "XDG_CACHE_HOME",
+            concat!(env!("CARGO_TARGET_TMPDIR"), "/cache"),
+        )
         .args(arguments)
         .output()
         .expect("the binary runs")
@@ -230,6 +234,105 @@ fn values_out_of_range_are_refused_with_the_range() {
         ("output.frames=0", ["output.frames", "1"]),
     ] {
         refused(&["replay", "slab", "--no-render", "--set", set], &words);
+    }
+}
+
+#[test]
+fn scene_files_that_are_no_scenes_are_refused_by_name_and_place() {
+    let folder = Folder::new("hostile-scenes");
+    let body = "[body]\nshape = \"slab\"\nextent_m = [0.1, 0.1, 0.1]\n";
+    let cases: [(String, &[&str]); 16] = [
+        (String::new(), &["body"]),
+        ("body".to_owned(), &["line 1"]),
+        ("[body]\n[body]\n".to_owned(), &["line 2"]),
+        ("\u{0}\u{1}".to_owned(), &["line 1"]),
+        (format!("a = {}", "[".repeat(100_000)), &["line 1"]),
+        (
+            format!("{body}colour = 3\n"),
+            &["line 4", "colour", "density_kg_m3"],
+        ),
+        (
+            format!("{body}density_kg_m3 = \"heavy\"\n"),
+            &["line 4", "f32"],
+        ),
+        (
+            format!("{body}[solver]\nsubsteps = -1\n"),
+            &["line 5", "u32"],
+        ),
+        (
+            format!("{body}[solver]\nsubsteps = 0\n"),
+            &["substeps", "1"],
+        ),
+        (
+            format!("{body}[solver]\ntimestep_s = inf\n"),
+            &["timestep_s"],
+        ),
+        (
+            format!("{body}[solver]\nmethod = \"magic\"\n"),
+            &["magic", "implicit"],
+        ),
+        (
+            format!("{body}[surface]\nkind = \"neon\"\n"),
+            &["neon", "gooey"],
+        ),
+        (
+            format!("{body}[output]\nsize = [1, 99999]\n"),
+            &["output.size", "8192"],
+        ),
+        (
+            format!("{body}[output]\nframes = 4000000000\n"),
+            &["output.frames", "10000000"],
+        ),
+        (
+            format!("{body}[[tool]]\nname = \"a\"\nradius_m = -1.0\nkeys = []\n"),
+            &["tool"],
+        ),
+        (
+            format!("{body}[[marker]]\nname = \"a\"\nnearest_m = [nan, 0, 0]\n"),
+            &["marker"],
+        ),
+    ];
+    for (text, words) in &cases {
+        let scene = folder.write("hostile.toml", text.as_bytes());
+        let mut all = vec!["hostile.toml"];
+        all.extend(*words);
+        refused(&["check", &scene], &all);
+    }
+    let scene = folder.write("latin.toml", b"title = \"\xe9\"\n");
+    refused(&["check", &scene], &["latin.toml", "UTF-8"]);
+    refused(
+        &["check", &folder.0.display().to_string()],
+        &["hostile-scenes"],
+    );
+}
+
+#[test]
+fn overrides_that_make_no_sense_are_refused_with_what_would() {
+    for (set, words) in [
+        ("", ["KEY=VALUE", "solver.substeps"]),
+        ("solver", ["KEY=VALUE", "solver.substeps"]),
+        ("=3", ["empty key", "=3"]),
+        ("solver..substeps=3", ["empty key", "solver..substeps"]),
+        ("solver.substeps.deeper=3", ["deeper", "plain value"]),
+        ("body.extent_m=[1, 2]", ["body.extent_m", "3"]),
+        ("body.extent_m=[-1, 1, 1]", ["body.extent_m", "100"]),
+        ("tool.9.radius_m=0.1", ["tool.9.radius_m", "0 to 0"]),
+        ("solver={}x", ["solver", "struct"]),
+        ("output.size=[8192, 8193]", ["output.size", "8192"]),
+        ("surface.samples=1000000", ["surface.samples", "within"]),
+    ] {
+        refused(&["replay", "slab", "--no-render", "--set", set], &words);
+    }
+    for (option, value, word) in [
+        ("--size", "100000x100000", "8192"),
+        ("--size", "0x0", "8192"),
+        ("--frames", "4000000000", "10000000"),
+        ("--frames", "0", "1.."),
+        ("--frames", "-1", "-1"),
+        ("--threads", "0", "1024"),
+        ("--dump", "x", "x"),
+    ] {
+        refused(&["replay", "slab", option, value], &[word]);
     }
 }
 

@@ -50,7 +50,7 @@ fn one(file: &Path) -> Result<String, AppError> {
     let title = scene.title.clone();
     // The files it names are read too, and its script is placed.
     let session = Session::new(scene, 1)?;
-    load::maps(&session.scene.body, &session.mesh)?;
+    load::maps(&session.scene.body, &session.mesh, &session.pictures)?;
     let mut text = format!(
         "scene, \"{title}\"\nsurface of {} points and {} triangles, {} tetrahedra, {} tools",
         session.mesh.points.len(),

@@ -1,9 +1,10 @@
 //! From a scene to a body that can be simulated and drawn.
 
+use super::cache::Cache;
 use super::{AppError, assets};
-use crate::geom::import::{self, ImportOptions, UvState};
-use crate::geom::lattice::{self, Lattice};
-use crate::geom::paint::{TissueMaps, paint};
+use crate::geom::import::{self, ImportOptions, ImportedSurface, TextureSource, UvState};
+use crate::geom::lattice::{self, Cells, Lattice};
+use crate::geom::paint::{OwnPictures, TissueMaps, lay_over};
 use crate::geom::tet::{lumped_masses_kg, skin};
 use crate::geom::unwrap::unwrap;
 use crate::geom::{Embedding, SurfaceMesh, TetMesh, bounds};
@@ -19,6 +20,9 @@ use std::path::{Path, PathBuf};
 /// tetrahedra.
 const FINEST_SHARE: f32 = 0.006;
 
+/// Scene files beyond this are refused unread [bytes]: a mouse recorded for an hour has a quarter of it.
+const SCENE_BYTES_MAX: u64 = 1 << 24;
+
 /// A scene's body, ready to be simulated and drawn.
 pub struct LoadedBody {
     /// The surface at rest.
@@ -27,6 +31,8 @@ pub struct LoadedBody {
     pub rest: RestBox,
     /// What the simulation starts from.
     pub setup: BodySetup,
+    /// The pictures that its file brought.
+    pub pictures: OwnPictures,
     /// What was guessed, repaired or left out, a sentence each.
     pub notes: Vec<String>,
 }
@@ -56,7 +62,7 @@ pub fn scene(name: &str, sets: &[String]) -> Result<Scene, AppError> {
                 .join(", "),
         });
     }
-    let text = std::fs::read_to_string(path).map_err(|source| AppError::Read {
+    let text = text(path).map_err(|source| AppError::Read {
         path: name.to_owned(),
         source,
     })?;
@@ -66,6 +72,17 @@ pub fn scene(name: &str, sets: &[String]) -> Result<Scene, AppError> {
         folder: path.parent(),
     };
     Ok(Scene::read(&source, sets)?)
+}
+
+/// The text of a scene file.
+fn text(path: &Path) -> std::io::Result<String> {
+    let bytes = std::fs::metadata(path)?.len();
+    if bytes > SCENE_BYTES_MAX {
+        return Err(std::io::Error::other(format!(
+            "{bytes} bytes are over the limit of {SCENE_BYTES_MAX} for a scene"
+        )));
+    }
+    std::fs::read_to_string(path)
 }
 
 /// What is simulated of a body, before it is known where it is held.
@@ -95,10 +112,11 @@ impl From<Lattice> for Tissue {
 pub fn body(scene: &Scene) -> Result<LoadedBody, AppError> {
     let section = &scene.body;
     let mut notes = Vec::new();
+    let mut pictures = OwnPictures::default();
     let (mesh, tissue) = match (&section.file, section.shape) {
         (Some(file), _) if section.names_tets() => tets(section, file, &mut notes)?,
         (Some(file), _) => {
-            let mesh = surface(section, file, &mut notes)?;
+            let mesh = surface(section, file, &mut pictures, &mut notes)?;
             let lattice = fill(section, &mesh, &mut notes)?;
             (mesh, lattice.into())
         }
@@ -118,7 +136,9 @@ pub fn body(scene: &Scene) -> Result<LoadedBody, AppError> {
         (None, _) => {
             let (mesh, lattice) = lattice::block(
                 extent(section),
-                cell_or_guess(section, extent(section).element_product()),
+                section.cell_m.unwrap_or_else(|| {
+                    lattice::cell_for_volume_m(extent(section).element_product())
+                }),
                 section.density_kg_m3,
             )?;
             (mesh, lattice.into())
@@ -154,6 +174,7 @@ pub fn body(scene: &Scene) -> Result<LoadedBody, AppError> {
         mesh,
         rest,
         setup: setup.numbered_along(),
+        pictures,
         notes,
     })
 }
@@ -181,12 +202,16 @@ fn activity(
     Ok(activity)
 }
 
-/// The texture maps of a body: its files, or its tissue painted.
+/// The texture maps of a body: the scene's files, or its tissue painted with the `pictures` that came with it.
 ///
 /// # Errors
 ///
 /// [`AppError::Map`] naming a file that is no picture or has another size than the first.
-pub fn maps(section: &BodySection, mesh: &SurfaceMesh) -> Result<TissueMaps, AppError> {
+pub fn maps(
+    section: &BodySection,
+    mesh: &SurfaceMesh,
+    pictures: &OwnPictures,
+) -> Result<TissueMaps, AppError> {
     let Some(MapFiles {
         outer,
         normal,
@@ -194,7 +219,9 @@ pub fn maps(section: &BodySection, mesh: &SurfaceMesh) -> Result<TissueMaps, App
         layers,
     }) = &section.maps
     else {
-        return Ok(paint(mesh, section.tissue, section.map_size_px));
+        let mut maps = Cache::of_user().painted(mesh, section.tissue, section.map_size_px);
+        lay_over(&mut maps, mesh, pictures);
+        return Ok(maps);
     };
     let outer = picture(outer)?.into_rgba8();
     let size_px = outer.width();
@@ -250,10 +277,7 @@ pub(super) fn picture(path: &Path) -> Result<DynamicImage, AppError> {
         message,
     };
     let bytes = assets::read(path).map_err(|e| wrong(e.to_string()))?;
-    let reader = image::ImageReader::new(std::io::Cursor::new(&bytes))
-        .with_guessed_format()
-        .map_err(|e| wrong(e.to_string()))?;
-    reader.decode().map_err(|e| wrong(e.to_string()))
+    import::read_picture_bytes(path, &bytes).map_err(|e| wrong(e.fault.to_string()))
 }
 
 /// The tetrahedra of `file`, scaled, with their own skin as surface.
@@ -301,7 +325,8 @@ fn tets(
         },
         tets,
     };
-    Ok((unwrap(&points, &skin.triangles), tissue))
+    let mesh = Cache::of_user().unwrapped(&points, &skin.triangles);
+    Ok((mesh, tissue))
 }
 
 /// What makes a body that is `longest_m` long in its file as long as its section says.
@@ -310,8 +335,18 @@ fn scale(section: &BodySection, longest_m: f32, notes: &mut Vec<String>) -> f32 
         return size_m / longest_m;
     }
     if !(1e-3..=2.0).contains(&longest_m) {
+        let unit = [("centimetres", 1e-2), ("millimetres", 1e-3)]
+            .into_iter()
+            .find(|(_, unit_m)| (0.02..=0.5).contains(&(longest_m * unit_m)))
+            .map(|(name, unit_m)| {
+                format!(
+                    ", in {name} it would be an organ: say body.size_m={:.3}",
+                    longest_m * unit_m
+                )
+            });
         notes.push(format!(
-            "the body is {longest_m} m long if the unit of its file is the metre: say body.size_m"
+            "the body is {longest_m} m long if the unit of its file is the metre{}",
+            unit.as_deref().unwrap_or(": say body.size_m")
         ));
     }
     1.0
@@ -321,6 +356,7 @@ fn scale(section: &BodySection, longest_m: f32, notes: &mut Vec<String>) -> f32 
 fn surface(
     section: &BodySection,
     file: &Path,
+    pictures: &mut OwnPictures,
     notes: &mut Vec<String>,
 ) -> Result<SurfaceMesh, AppError> {
     let bytes = assets::read(file).map_err(|source| AppError::Read {
@@ -330,15 +366,18 @@ fn surface(
     let options = ImportOptions {
         meshes: section.meshes.clone(),
     };
-    let imported = import::read_surface_bytes(file, &bytes, &options)?;
+    let mut imported = import::read_surface_bytes(file, &bytes, &options)?;
     // A bundled surface is as we made it; its textures are in the binary, not beside it.
     if !assets::is_bundled(file) {
-        notes.extend(imported.notes);
+        notes.append(&mut imported.notes);
+    }
+    if section.maps.is_none() {
+        *pictures = own_pictures(&imported, notes);
     }
     let mut mesh = imported.mesh;
     if imported.uv != UvState::Usable {
-        notes.push(format!("{}: unwrapped anew", imported.uv));
-        mesh = unwrap(&mesh.points, &mesh.point_triangles());
+        notes.push("texture coordinates are made anew".to_owned());
+        mesh = Cache::of_user().unwrapped(&mesh.points, &mesh.point_triangles());
     }
     let (low, high) = mesh.bounds();
     let longest_m = (high - low).max_element();
@@ -355,27 +394,70 @@ fn surface(
     Ok(mesh)
 }
 
+/// The pictures that came with a surface. One that can't be used is a note: the shape is still good.
+fn own_pictures(imported: &ImportedSurface, notes: &mut Vec<String>) -> OwnPictures {
+    let mut usable = |what: &str, source: &Option<TextureSource>| {
+        let source = source.as_ref()?;
+        let name = match source {
+            TextureSource::File(file) => file.display().to_string(),
+            TextureSource::Embedded(_) => "in the file".to_owned(),
+        };
+        match import::read_picture(source) {
+            Ok(picture) => {
+                notes.push(format!(
+                    "the {what} is its own picture, {name}, {} x {}",
+                    picture.width(),
+                    picture.height()
+                ));
+                Some(picture.into_rgb8())
+            }
+            Err(error) => {
+                notes.push(format!("the {what} is painted: {name}: {}", error.fault));
+                None
+            }
+        }
+    };
+    match imported.uv {
+        UvState::Usable => OwnPictures {
+            color: usable("colour", &imported.base_color),
+            normal: usable("relief", &imported.normal),
+            corners: Vec::new(),
+        },
+        // A picture may repeat or be shared; it is carried over to the new texture coordinates.
+        UvState::Outside | UvState::Overlapping { .. } => OwnPictures {
+            color: usable("colour", &imported.base_color),
+            normal: None,
+            corners: (imported.mesh.triangles.iter())
+                .map(|t| t.map(|vertex| imported.mesh.uvs[vertex as usize]))
+                .collect(),
+        },
+        UvState::Missing | UvState::NonFinite | UvState::NoArea => OwnPictures::default(),
+    }
+}
+
 fn fill(
     section: &BodySection,
     mesh: &SurfaceMesh,
     notes: &mut Vec<String>,
 ) -> Result<Lattice, AppError> {
-    let cell_m = cell_or_guess(section, mesh.volume_m3() as f32);
-    let lattice = Lattice::around(mesh, cell_m, section.density_kg_m3)?;
-    if section.cell_m.is_none() {
-        notes.push(format!(
-            "cells of {:.2} mm: {} tetrahedra",
-            1e3 * cell_m,
-            lattice.tets.tets.len()
-        ));
+    if let Some(cell_m) = section.cell_m {
+        return Ok(Lattice::around(mesh, cell_m, section.density_kg_m3)?);
     }
+    let Cells { cell_m, thin_m } = lattice::cells_for(mesh);
+    let lattice = Lattice::around(mesh, cell_m, section.density_kg_m3)?;
+    let mut note = format!(
+        "cells of {:.3} mm: {} tetrahedra",
+        1e3 * cell_m,
+        lattice.tets.tets.len()
+    );
+    if thin_m < 0.99 * cell_m {
+        note += &format!(
+            "; much of the body is thinner than one, {:.3} mm or less: body.cell_m sets smaller ones, at a cost",
+            1e3 * thin_m
+        );
+    }
+    notes.push(note);
     Ok(lattice)
-}
-
-fn cell_or_guess(section: &BodySection, volume_m3: f32) -> f32 {
-    section
-        .cell_m
-        .unwrap_or_else(|| lattice::cell_for_volume_m(volume_m3))
 }
 
 /// Extent of a shape [m], made as long as its section says.

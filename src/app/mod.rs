@@ -1,6 +1,7 @@
 //! Where everything meets: sessions, the replay, the window, and the commands that read and list.
 
 mod assets;
+mod cache;
 mod check;
 mod dump;
 mod error;

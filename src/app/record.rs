@@ -158,7 +158,7 @@ impl Recording {
         Ok(write_frames_csv(file, &self.records)?)
     }
 
-    /// Writes all files of a run into `out`.
+    /// Writes all files of a run into `out`; `sets` are the values that were replaced for it.
     ///
     /// # Errors
     ///
@@ -166,6 +166,7 @@ impl Recording {
     pub fn write(
         mut self,
         out: &Path,
+        sets: &[String],
         session: &Session,
         renderer: Option<&Renderer>,
     ) -> Result<(), AppError> {
@@ -180,6 +181,8 @@ impl Recording {
             summary: &summary,
             records: &self.records,
             machine: &machine,
+            sets,
+            notes: &session.notes,
             pictures: thinned(std::mem::take(&mut self.pictures)),
         })
         .write(&out.join("report.html"))?;

@@ -48,7 +48,8 @@ impl Renderer {
     ///
     /// [`AppError`] naming the texture or the pass that can't be used.
     pub fn new(gpu: Gpu, session: &Session, size: [u32; 2]) -> Result<Self, AppError> {
-        let tissue = Arc::new(load::maps(&session.scene.body, &session.mesh)?);
+        let maps = load::maps(&session.scene.body, &session.mesh, &session.pictures)?;
+        let tissue = Arc::new(maps);
         Self::with_maps(gpu, session, tissue, size)
     }
 

@@ -96,8 +96,12 @@ pub fn replay(options: &ReplayOptions) -> Result<Outcome, AppError> {
     let picture_s = f64::from(output.png_every) * f64::from(run.session.scene.solver.timestep_s);
     run.preview
         .write(&options.out.join("preview.apng"), picture_s)?;
-    run.recording
-        .write(&options.out, &run.session, run.renderer.as_ref())?;
+    run.recording.write(
+        &options.out,
+        &options.sets,
+        &run.session,
+        run.renderer.as_ref(),
+    )?;
     match &options.against {
         None => Ok(Outcome::Done),
         Some(recorded) => compare(recorded, &options.out),
@@ -156,7 +160,7 @@ impl Run {
             None
         };
         create_folder(&options.out)?;
-        remove_old_pictures(&options.out)?;
+        remove_leftovers(&options.out)?;
         Ok(Self {
             recording: Recording::new(options.scene.clone(), threads),
             preview: Preview::default(),
@@ -249,19 +253,19 @@ impl Run {
 }
 
 /// Takes away the pictures of an earlier run, which would stand beside this one's files as if they were
-/// its own.
-fn remove_old_pictures(out: &Path) -> Result<(), AppError> {
+/// its own, and what a run that was killed had not finished.
+fn remove_leftovers(out: &Path) -> Result<(), AppError> {
     let failed = |source| AppError::Read {
         path: out.display().to_string(),
         source,
     };
     for entry in std::fs::read_dir(out).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
-        let is_picture = path
+        let is_leftover = path
             .file_name()
             .and_then(|name| name.to_str())
-            .is_some_and(is_run_picture);
-        if is_picture {
+            .is_some_and(|name| is_run_picture(name) || is_unfinished(name));
+        if is_leftover {
             std::fs::remove_file(&path).map_err(failed)?;
         }
     }
@@ -275,6 +279,12 @@ fn is_run_picture(name: &str) -> bool {
         .and_then(|rest| rest.strip_suffix(".png"));
     name == "preview.apng"
         || number.is_some_and(|number| number.bytes().all(|b| b.is_ascii_digit()))
+}
+
+/// Whether a file that was being written has such a name.
+fn is_unfinished(name: &str) -> bool {
+    let process = (name.strip_suffix(".partial")).and_then(|rest| Some(rest.rsplit_once('.')?.1));
+    process.is_some_and(|process| process.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// Frames between two samples of the states: about ten samples a replay, whatever its length.

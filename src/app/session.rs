@@ -4,6 +4,7 @@ use super::AppError;
 use super::load::{self, LoadedBody};
 use super::script::Script;
 use crate::geom::SurfaceMesh;
+use crate::geom::paint::OwnPictures;
 use crate::geom::ray::nearest_point;
 use crate::passes::tools::DrawnTool;
 use crate::scene::{BeatSection, MarkerSection, RestBox, Scene};
@@ -20,6 +21,8 @@ pub struct Session {
     pub mesh: SurfaceMesh,
     /// The box around it.
     pub rest: RestBox,
+    /// The pictures that its file brought.
+    pub pictures: OwnPictures,
     /// What was guessed or repaired while loading.
     pub notes: Vec<String>,
     /// Whether the scripted tools move; without it they are not there.
@@ -65,6 +68,7 @@ impl Session {
             mesh,
             rest,
             setup,
+            pictures,
             notes,
         } = load::body(&scene)?;
         let markers = scene
@@ -87,6 +91,7 @@ impl Session {
             scene,
             mesh,
             rest,
+            pictures,
             notes,
             markers,
         })

@@ -9,6 +9,7 @@ mod embed;
 mod graded;
 mod inside;
 mod sphere;
+mod thickness;
 
 pub use block::{block, block_of_cells};
 pub use embed::{boundary_triangles, embed};
@@ -22,8 +23,10 @@ use std::fmt;
 
 /// More tetrahedra than this are refused: no machine this runs on would finish a frame.
 pub const TETS_MAX: usize = 2_000_000;
-/// Tetrahedra if nothing else is asked for.
+/// Tetrahedra inside a body if nothing else is asked for: what one core steps 20 times in a frame.
 const TETS_DEFAULT: f64 = 5_000.0;
+/// Tetrahedra that a thin body may have if nothing else is asked for.
+const TETS_THIN_MAX: f64 = 20_000.0;
 /// Cubes of the grid round the surface, kept or not; bounds the memory of the inside test.
 const GRID_CUBES_MAX: f64 = 8e6;
 /// A tetrahedron counts as at least this full. With less at the surface, its outermost tetrahedra
@@ -169,11 +172,30 @@ impl Lattice {
     }
 }
 
-/// A cube edge [m] that gives about 5,000 tetrahedra: what one core steps 20 times in a frame.
+/// The cubes that a surface gets if nothing else is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cells {
+    /// Their edge [m].
+    pub cell_m: f32,
+    /// Thickness of the body under the thinnest quarter of its surface [m].
+    pub thin_m: f32,
+}
+
+/// Cubes for `surface`: 5,000 tetrahedra inside; smaller cubes where it is thinner than one, until there
+/// are about 20,000 tetrahedra; and larger ones where its surface alone would cut more.
 ///
-/// Never below the smallest edge that [`Lattice::around`] takes; 0 for an empty surface.
-pub fn default_cell_m(surface: &SurfaceMesh) -> f32 {
-    cell_for_tets_m(surface, TETS_DEFAULT) as f32
+/// Zero for an empty surface.
+pub fn cells_for(surface: &SurfaceMesh) -> Cells {
+    let thin_m = thickness::thin_m(surface);
+    let by_volume_m = cell_for_volume_m(surface.volume_m3().abs() as f32);
+    let by_budget_m = cell_for_tets_m(surface, TETS_THIN_MAX).max(smallest_cell_m(surface));
+    let (low, high) = surface.bounds();
+    Cells {
+        cell_m: (by_volume_m.min(thin_m))
+            .max(by_budget_m as f32)
+            .min((high - low).max_element()),
+        thin_m,
+    }
 }
 
 /// A cube edge [m] that fills `volume_m3` with about 5,000 tetrahedra, for shapes that need no cubes

@@ -7,6 +7,7 @@
 //! painted as if scaled to it. Results do not depend on the number of threads.
 
 mod canvas;
+mod own;
 mod relief;
 mod tissue;
 mod vessel;
@@ -16,6 +17,7 @@ use super::organ::{Features, Organ};
 use canvas::Canvas;
 use glam::Vec3;
 use image::{DynamicImage, Rgba, RgbaImage};
+pub use own::{OwnPictures, lay_over};
 use rayon::prelude::*;
 
 /// What a surface is painted as.

@@ -10,7 +10,7 @@ pub(super) const AXIS_COLOR: &str = "#8a8f98";
 pub(super) const GRID_COLOR: &str = "#e4e6ea";
 pub(super) const TEXT_COLOR: &str = "#3c4048";
 pub(super) const MARK_COLOR: &str = "#b3261e";
-const LEFT_PX: f64 = 58.0;
+const LEFT_PX: f64 = 68.0;
 const RIGHT_PX: f64 = 12.0;
 /// Room at the right for the names of levels.
 const LEVEL_NAMES_PX: f64 = 74.0;

@@ -71,7 +71,8 @@ impl std::error::Error for FileError {
     }
 }
 
-/// Makes the folder and those above it.
+/// Makes the folder and those above it, and sees that a file can be made in it: a long run should not find
+/// out at its end.
 ///
 /// # Errors
 ///
@@ -82,10 +83,14 @@ pub fn create_folder(folder: &Path) -> Result<(), FileError> {
             file: file.to_owned(),
         });
     }
-    std::fs::create_dir_all(folder).map_err(|source| FileError::Write {
-        file: folder.to_owned(),
-        source,
-    })
+    let trial = folder.join(format!("trial.{}.partial", std::process::id()));
+    std::fs::create_dir_all(folder)
+        .and_then(|()| File::create(&trial))
+        .and_then(|_| std::fs::remove_file(&trial))
+        .map_err(|source| FileError::Write {
+            file: folder.to_owned(),
+            source,
+        })
 }
 
 /// Reads a whole file.

@@ -21,6 +21,10 @@ pub struct Replay<'a> {
     pub records: &'a [FrameRecord],
     /// What it ran on, see [`machine`].
     pub machine: &'a str,
+    /// The values of the scene that were replaced for this run, as `key=value`.
+    pub sets: &'a [String],
+    /// What was guessed, mended or left out when the scene was loaded.
+    pub notes: &'a [String],
     /// PNG files, each with what it shows.
     pub pictures: Vec<(Vec<u8>, String)>,
 }
@@ -31,6 +35,8 @@ pub fn replay_page(replay: Replay) -> Page {
         summary,
         records,
         machine,
+        sets,
+        notes,
         pictures,
     } = replay;
     let mut sections = vec![
@@ -48,11 +54,15 @@ pub fn replay_page(replay: Replay) -> Page {
     if !summary.markers.is_empty() {
         sections.push(markers(summary));
     }
-    sections.push(setup(summary, machine));
+    sections.push(setup(summary, machine, sets, notes));
+    let with = match sets {
+        [] => String::new(),
+        sets => format!(" · with {}", sets.join(", ")),
+    };
     Page {
         title: format!("Replay of {}", summary.scene),
         subtitle: format!(
-            "palpate {} ({}) · {} frames at {} × {} pixels · {}",
+            "palpate {} ({}) · {} frames at {} × {} pixels · {}{with}",
             summary.version,
             summary.commit,
             summary.frames,
@@ -407,8 +417,8 @@ fn markers(summary: &Summary) -> Section {
     }
 }
 
-fn setup(summary: &Summary, machine: &str) -> Section {
-    let facts = [
+fn setup(summary: &Summary, machine: &str, sets: &[String], notes: &[String]) -> Section {
+    let mut facts = vec![
         ("Machine", machine.to_owned()),
         (
             "GPU adapter",
@@ -436,13 +446,17 @@ fn setup(summary: &Summary, machine: &str) -> Section {
         ),
         ("SHA-256 of the final state", summary.state_sha256.clone()),
     ];
+    let told = [("Set for this run", sets), ("Noted on loading", notes)];
+    let told = told.into_iter().filter(|(_, lines)| !lines.is_empty());
+    facts.extend(told.map(|(name, lines)| (name, lines.join("; "))));
     Section {
         title: "Set-up".to_owned(),
         blocks: vec![Block::Table(Table {
             head: Vec::new(),
             rows: facts
+                .into_iter()
                 .map(|(name, value)| vec![name.to_owned(), value])
-                .to_vec(),
+                .collect(),
         })],
     }
 }
@@ -519,6 +533,8 @@ mod tests {
             summary: &summary,
             records: &records,
             machine: &machine,
+            sets: &["body.file='spleen.glb'".to_owned()],
+            notes: &["texture coordinates are made anew".to_owned()],
             pictures: [0, 70, 299].map(picture).to_vec(),
         });
         let html = page.html();
@@ -534,6 +550,8 @@ mod tests {
         assert!(html.contains("light map, diffusion blur"));
         assert!(html.contains(&summary.state_sha256));
         assert!(html.contains("llvmpipe"));
+        assert_eq!(html.matches("spleen.glb").count(), 2);
+        assert!(html.contains("made anew"));
         assert_eq!(html.matches("data:image/png;base64,").count(), 3);
         // The stalled frame is marked, not lost.
         assert!(html.contains("l3.5 6h-7z"));
@@ -556,6 +574,8 @@ mod tests {
             summary: &summary,
             records: &[],
             machine: "a machine",
+            sets: &[],
+            notes: &[],
             pictures: Vec::new(),
         })
         .html();

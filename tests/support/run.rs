@@ -16,6 +16,11 @@ pub fn folder(name: &str) -> PathBuf {
 /// The program with these arguments, ready to run.
 pub fn palpate<S: AsRef<str>>(arguments: &[S]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_palpate"));
+    // What is kept for the next start is kept beside the tests' other files.
+    command.env(
+        "XDG_CACHE_HOME",
+        concat!(env!("CARGO_TARGET_TMPDIR"), "/cache"),
+    );
     command.args(arguments.iter().map(AsRef::as_ref));
     command
 }

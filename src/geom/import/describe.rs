@@ -138,7 +138,14 @@ fn describe_surface(path: &Path) -> Result<String, ImportError> {
     for note in &surface.notes {
         writeln!(text, "note: {note}").expect(TO_STRING);
     }
-    if let Some(source) = &surface.base_color {
+    let pictures = [
+        ("base colour", &surface.base_color),
+        ("normals", &surface.normal),
+    ];
+    for (what, source) in pictures {
+        let Some(source) = source else {
+            continue;
+        };
         let place = match source {
             TextureSource::File(file) => file.display().to_string(),
             TextureSource::Embedded(_) => "embedded".to_owned(),
@@ -147,7 +154,7 @@ fn describe_surface(path: &Path) -> Result<String, ImportError> {
             TextureSource::File(_) => error,
             TextureSource::Embedded(_) => error.fault.of(path),
         })?;
-        writeln!(text, "base colour: {place}, {}", about(&picture)).expect(TO_STRING);
+        writeln!(text, "{what}: {place}, {}", about(&picture)).expect(TO_STRING);
     }
     Ok(text.trim_end().to_owned())
 }

@@ -8,7 +8,7 @@ use super::error::ImportFault;
 use super::part::{FileParts, Part, Room, TextureSource};
 use ::gltf::json::mesh::{Mode, Primitive, Semantic};
 use ::gltf::json::validation::Checked;
-use ::gltf::json::{Index, Material, Mesh, Node, Root};
+use ::gltf::json::{Index, Material, Mesh, Node, Root, Texture};
 use glam::{DMat4, DQuat, DVec3, Vec2, Vec3};
 use std::path::Path;
 
@@ -260,7 +260,7 @@ impl Reader<'_> {
             let added = part.triangles.len() - before;
             if added > most_triangles {
                 most_triangles = added;
-                part.base_color = self.base_color(primitive.material, &place)?;
+                (part.base_color, part.normal) = self.pictures(primitive.material, &place)?;
             }
         }
         // A transform that mirrors turns the surface inside out; swapping two corners undoes it.
@@ -372,36 +372,60 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Where the base colour picture of `material` is. A picture that cannot be found is a note:
-    /// the shape is still good.
-    fn base_color(
+    /// Where the pictures of base colour and normals of `material` are.
+    fn pictures(
         &mut self,
         material: Option<Index<Material>>,
         place: &str,
+    ) -> Result<(Option<TextureSource>, Option<TextureSource>), ImportFault> {
+        let Some(index) = material else {
+            return Ok((None, None));
+        };
+        let material = self.document.root.materials.get(index.value());
+        let problem = "its material does not exist";
+        let material = material.ok_or_else(|| ImportFault::malformed(place, problem))?;
+        let color = material.pbr_metallic_roughness.base_color_texture.as_ref();
+        let normal = material.normal_texture.as_ref();
+        Ok((
+            self.picture(color.map(|t| (t.index, t.tex_coord)), "base colour", place)?,
+            self.picture(normal.map(|t| (t.index, t.tex_coord)), "normal", place)?,
+        ))
+    }
+
+    /// Where a texture's picture is, given its set of texture coordinates. A picture that cannot be
+    /// found is a note: the shape is still good.
+    fn picture(
+        &mut self,
+        texture: Option<(Index<Texture>, u32)>,
+        what: &str,
+        place: &str,
     ) -> Result<Option<TextureSource>, ImportFault> {
         let root = self.document.root;
-        let Some(index) = material else {
+        let Some((texture, set)) = texture else {
             return Ok(None);
         };
-        let bad = |problem: &str| ImportFault::malformed(place, problem);
-        let material = root.materials.get(index.value());
-        let material = material.ok_or_else(|| bad("its material does not exist"))?;
-        let Some(texture) = &material.pbr_metallic_roughness.base_color_texture else {
+        let bad = |problem: &str| ImportFault::malformed(place, format!("its {what} {problem}"));
+        let texture = root.textures.get(texture.value());
+        let texture = texture.ok_or_else(|| bad("texture does not exist"))?;
+        if texture.source.value() == u32::MAX as usize {
+            let note = format!("{place}: the {what} texture has no PNG or JPEG and is left out");
+            self.file.notes.push(note);
             return Ok(None);
-        };
-        let texture = root.textures.get(texture.index.value());
-        let texture = texture.ok_or_else(|| bad("its base colour texture does not exist"))?;
+        }
         let image = root.images.get(texture.source.value());
-        let image = image.ok_or_else(|| bad("its base colour image does not exist"))?;
+        let image = image.ok_or_else(|| bad("image does not exist"))?;
+        if set != 0 {
+            let note = format!("{place}: the {what} picture is for TEXCOORD_{set} and is left out");
+            self.file.notes.push(note);
+            return Ok(None);
+        }
         if let Some(view) = image.buffer_view {
             return Ok(Some(TextureSource::Embedded(
                 self.document.view(view)?.to_vec(),
             )));
         }
         let Some(uri) = &image.uri else {
-            return Err(bad(
-                "its base colour image has neither a bufferView nor a uri",
-            ));
+            return Err(bad("image has neither a bufferView nor a uri"));
         };
         Ok(match container::resolve(uri, self.path, place)? {
             Resource::Bytes(bytes) => Some(TextureSource::Embedded(bytes)),

@@ -14,9 +14,16 @@ use std::str::SplitWhitespace;
 pub(super) fn read(bytes: &[u8], path: &Path) -> Result<FileParts, ImportFault> {
     let text = String::from_utf8_lossy(bytes);
     let mut reader = Reader::default();
-    for (number, line) in text.lines().enumerate() {
+    let mut lines = text.trim_start_matches('\u{feff}').lines().enumerate();
+    while let Some((number, line)) = lines.next() {
+        let mut line = std::borrow::Cow::Borrowed(line);
+        // A backslash at its end joins a line with the next one.
+        while let Some(begun) = line.strip_suffix('\\') {
+            let next = lines.next().map_or("", |(_, next)| next);
+            line = format!("{begun} {next}").into();
+        }
         reader
-            .line(line)
+            .line(&line)
             .map_err(|problem| ImportFault::malformed(format!("line {}", number + 1), problem))?;
     }
     reader.finish(path)
@@ -129,8 +136,12 @@ impl Reader {
                 Ok(bytes) => {
                     let text = String::from_utf8_lossy(&bytes).into_owned();
                     let picture = picture_of(&text, material);
-                    let source =
-                        picture.map(|name| TextureSource::File(library.with_file_name(name)));
+                    let file = picture.map(|name| library.with_file_name(name));
+                    if let Some(gone) = file.as_ref().filter(|file| !file.is_file()) {
+                        let note = format!("picture {} is not there", gone.display());
+                        self.file.notes.push(note);
+                    }
+                    let source = file.filter(|file| file.is_file()).map(TextureSource::File);
                     for part in &mut self.file.parts {
                         part.base_color = source.clone();
                     }
@@ -145,14 +156,22 @@ impl Reader {
     }
 }
 
-/// `map_Kd` of `material` in an MTL file.
-fn picture_of<'a>(library: &'a str, material: &str) -> Option<&'a str> {
+/// `map_Kd` of `material` in an MTL file, as a path below the library's folder.
+fn picture_of(library: &str, material: &str) -> Option<String> {
     let mut inside = false;
     for line in library.lines().map(str::trim) {
         if let Some(name) = line.strip_prefix("newmtl ") {
             inside = name.trim() == material;
         } else if let Some(picture) = line.strip_prefix("map_Kd ").filter(|_| inside) {
-            return Some(picture.trim());
+            // Options stand before the name, each with its numbers.
+            let is_option = |word: &&str| word.starts_with('-') || word.parse::<f32>().is_ok();
+            let words: Vec<&str> = match picture.trim().starts_with('-') {
+                true => picture.split_whitespace().skip_while(is_option).collect(),
+                false => vec![picture.trim()],
+            };
+            let name = words.join(" ").replace('\\', "/");
+            // A root would lead out of the library's folder.
+            return Some(name.trim_start_matches('/').to_owned());
         }
     }
     None

@@ -25,8 +25,10 @@ pub struct Part {
     pub uvs: Option<Vec<Vec2>>,
     /// Corners as indices of `positions`, all in range.
     pub triangles: Vec<[u32; 3]>,
-    /// The picture of the part's material, if it names one.
+    /// The picture of its material's colour, if it names one.
     pub base_color: Option<TextureSource>,
+    /// The picture of its material's normals in tangent space, as glTF has them.
+    pub normal: Option<TextureSource>,
 }
 
 /// Where the picture of a material is.

@@ -6,8 +6,10 @@ use image::{DynamicImage, ImageReader, Limits};
 use std::io::Cursor;
 use std::path::Path;
 
-/// Pictures with a longer side are refused [pixels]; the decoder bounds the memory besides.
+/// Pictures with a longer side are refused [pixels].
 const SIDE_MAX: u32 = 16_384;
+/// And so are those that take more when they are unpacked [bytes]: 8192 x 8192 pixels of four bytes.
+const UNPACKED_BYTES_MAX: u64 = 1 << 28;
 
 /// The PNG or JPEG at `source`.
 ///
@@ -38,6 +40,14 @@ pub fn read_picture_bytes(file: &Path, bytes: &[u8]) -> Result<DynamicImage, Imp
     let mut limits = Limits::default();
     limits.max_image_width = Some(SIDE_MAX);
     limits.max_image_height = Some(SIDE_MAX);
+    limits.max_alloc = Some(UNPACKED_BYTES_MAX);
     reader.limits(limits);
-    reader.decode().map_err(|error| bad(error.to_string()))
+    reader.decode().map_err(|error| match error {
+        image::ImageError::Limits(_) => bad(format!(
+            "it has more than {SIDE_MAX} pixels a side or takes more than {} MiB unpacked",
+            UNPACKED_BYTES_MAX >> 20
+        )),
+        // Some decoders end their message with a new line.
+        other => bad(other.to_string().trim_end().to_owned()),
+    })
 }

@@ -1,7 +1,9 @@
-//! Small defects mended: fins and crowded edges cut out, small holes fanned shut.
+//! Small defects mended: fins and crowded edges cut out, small holes fanned shut; and, where nothing less
+//! makes a body, lids over a few openings.
 
 use super::topology::{Defects, EdgeUse, defects, edge_uses, fans, flips, same_edge};
 use super::weld::{Face, Union, Vertex};
+use crate::geom::bounds;
 use glam::{Vec2, Vec3};
 use std::collections::HashMap;
 
@@ -16,12 +18,27 @@ const PEELS_MAX: usize = 16;
 const HOLE_EDGES_MAX: usize = 64;
 /// As [`HOLE_EDGES_MAX`], as a share of the diagonal of the surface.
 const HOLE_RIM_SHARE: f32 = 0.5;
+/// More openings than this, or one with more edges, are no body that was cut off.
+const OPENINGS_MAX: usize = 8;
+const OPENING_EDGES_MAX: usize = 4096;
+/// Lids over openings may have this share of the area of the rest: over half a ball it is 0.5, over a sheet 1.
+const LID_SHARE_MAX: f64 = 0.6;
 
 /// What a repair did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Repair {
     pub removed: usize,
     pub holes: usize,
+    pub openings: usize,
+}
+
+/// Which holes are closed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Close {
+    /// Those that are small enough to be defects.
+    Holes,
+    /// Openings too, if they are few and the lids over them small beside the rest.
+    Openings,
 }
 
 /// Mends `union` in place until every edge has two triangles.
@@ -29,7 +46,7 @@ pub(super) struct Repair {
 /// # Errors
 ///
 /// The defects that are left if it cannot be mended within the limits; `union` is then half mended.
-pub(super) fn repair(union: &mut Union) -> Result<Repair, Defects> {
+pub(super) fn repair(union: &mut Union, what: Close) -> Result<Repair, Defects> {
     let mut done = Repair::default();
     let removed_max = REMOVED_MIN.max(union.faces.len() / REMOVED_SHARE);
     for _ in 0..ROUNDS_MAX {
@@ -41,7 +58,12 @@ pub(super) fn repair(union: &mut Union) -> Result<Repair, Defects> {
         if done.removed > removed_max {
             return Err(found);
         }
-        done.holes += fill_holes(union);
+        let (holes, openings) = fill_holes(union, what);
+        done.holes += holes;
+        done.openings += openings;
+        if done.openings > OPENINGS_MAX {
+            return Err(found);
+        }
     }
     let left = defects(&union.point_triangles());
     if left.none() { Ok(done) } else { Err(left) }
@@ -75,24 +97,43 @@ fn cut_crowded(union: &mut Union) -> usize {
     before - union.faces.len()
 }
 
-/// Closes every hole within the limits by a fan about its middle; returns how many there were.
-fn fill_holes(union: &mut Union) -> usize {
+/// Closes every hole within the limits by a fan about its middle; returns how many holes and openings there were.
+fn fill_holes(union: &mut Union, what: Close) -> (usize, usize) {
     let triangles = union.point_triangles();
     let Some(flip) = flips(&triangles) else {
-        return 0;
+        return (0, 0);
     };
-    let (low, high) = crate::geom::bounds(&union.points);
+    let (low, high) = bounds(&union.points);
     let rim_max_m = low.distance(high) * HOLE_RIM_SHARE;
-    let rims: Vec<Rim> = rims(union, &flip);
-    let holes: Vec<Rim> = rims
+    let (holes, openings): (Vec<Rim>, Vec<Rim>) = rims(union, &flip)
         .into_iter()
-        .filter(|rim| rim.len() >= 3 && rim.len() <= HOLE_EDGES_MAX)
-        .filter(|rim| rim_length_m(union, rim) <= rim_max_m)
-        .collect();
+        .filter(|rim| rim.len() >= 3)
+        .partition(|rim| rim.len() <= HOLE_EDGES_MAX && rim_length_m(union, rim) <= rim_max_m);
     for rim in &holes {
         close(union, rim);
     }
-    holes.len()
+    let bearable = what == Close::Openings
+        && openings.len() <= OPENINGS_MAX
+        && openings.iter().all(|rim| rim.len() <= OPENING_EDGES_MAX);
+    if !bearable {
+        return (holes.len(), 0);
+    }
+    let rest = union.faces.len();
+    for rim in &openings {
+        close(union, rim);
+    }
+    let area_m2 = |faces: &[Face]| faces.iter().map(|face| area_m2(union, face)).sum::<f64>();
+    if area_m2(&union.faces[rest..]) > LID_SHARE_MAX * area_m2(&union.faces[..rest]) {
+        union.faces.truncate(rest);
+        return (holes.len(), 0);
+    }
+    (holes.len(), openings.len())
+}
+
+fn area_m2(union: &Union, face: &Face) -> f64 {
+    let corners = union.face_points(face);
+    let [a, b, c] = corners.map(|point| union.points[point as usize].as_dvec3());
+    (b - a).cross(c - a).length() / 2.0
 }
 
 /// The border edges round one hole as pairs of vertices, in the order in which triangles that close

@@ -3,7 +3,7 @@
 use super::closure::closing_selections;
 use super::error::{ImportError, ImportFault};
 use super::part::{FileParts, Part, TextureSource, parts_of, read_parts};
-use super::repair::{Repair, repair, split_touching_points};
+use super::repair::{Close, Repair, repair, split_touching_points};
 use super::topology::{defects, flips, pieces};
 use super::uv::{UvState, triangles_without_uv_area, uv_state};
 use super::weld::{Union, weld, weld_near_borders};
@@ -39,8 +39,10 @@ pub struct ImportedSurface {
     pub uv: UvState,
     /// What was left out, joined or mended; a sentence each.
     pub notes: Vec<String>,
-    /// The picture of the material that covers most of the surface.
+    /// The picture of colour of the material that covers most of the surface.
     pub base_color: Option<TextureSource>,
+    /// The picture of normals of the same material.
+    pub normal: Option<TextureSource>,
     /// Names of the meshes that the surface is made of.
     pub meshes_used: Vec<String>,
 }
@@ -169,6 +171,9 @@ fn choose(union: &Union, part_count: usize) -> Result<Closed, ImportFault> {
             mended.extend(close(&union.of_parts(|other| other == part), Mend::Yes));
         }
     }
+    if mended.is_empty() {
+        mended.extend(close(union, Mend::Openings));
+    }
     largest(mended).ok_or(match whole {
         ImportFault::Open {
             border_edges,
@@ -229,6 +234,7 @@ fn diagonal_m(union: &Union) -> f32 {
 enum Mend {
     No,
     Yes,
+    Openings,
 }
 
 /// Makes `union` closed, consistent and outward, and keeps its largest piece.
@@ -237,13 +243,21 @@ fn close(union: &Union, mend: Mend) -> Result<Closed, ImportFault> {
     let duplicates = union.drop_duplicates();
     let mut done = Repair::default();
     let mut left = defects(&union.point_triangles());
-    if mend == Mend::Yes {
-        match repair(&mut union) {
+    let what = match mend {
+        Mend::No => None,
+        Mend::Yes => Some(Close::Holes),
+        Mend::Openings => Some(Close::Openings),
+    };
+    if let Some(what) = what {
+        match repair(&mut union, what) {
             Ok(repair) => (done, left) = (repair, Default::default()),
             Err(defects) => left = defects,
         }
     }
-    if !left.none() || union.faces.is_empty() {
+    if union.faces.is_empty() {
+        return Err(ImportFault::Flat);
+    }
+    if !left.none() {
         return Err(ImportFault::Open {
             border_edges: left.border,
             crowded_edges: left.crowded,
@@ -350,6 +364,11 @@ impl Closed {
         );
         note(self.repair.holes, "small holes closed");
         note(
+            self.repair.openings,
+            "openings closed by lids: the body is filled as if it were solid; give a vessel or a cup its \
+             wall in a modelling program",
+        );
+        note(
             self.split,
             "points doubled where two sheets touch in one point",
         );
@@ -385,12 +404,14 @@ impl Closed {
             .iter()
             .filter(|&&part| parts[part as usize].base_color.is_some());
         let pictured = pictured.max_by_key(|&&part| faces[part as usize]);
+        let pictured = pictured.map(|&part| &parts[part as usize]);
         let name = |&part: &u32| parts[part as usize].name.clone();
         ImportedSurface {
             mesh,
             uv,
             notes,
-            base_color: pictured.and_then(|&part| parts[part as usize].base_color.clone()),
+            base_color: pictured.and_then(|part| part.base_color.clone()),
+            normal: pictured.and_then(|part| part.normal.clone()),
             meshes_used: used.iter().map(name).collect(),
         }
     }

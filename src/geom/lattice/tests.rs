@@ -113,16 +113,46 @@ fn fill_of_a_ball_adds_up_to_its_volume() {
 }
 
 #[test]
-fn default_cell_gives_about_five_thousand_tetrahedra() {
+fn cells_of_a_thick_body_give_about_five_thousand_tetrahedra() {
     for surface in [
         ball(0.05),
         block_of_cells(Vec3::new(0.2, 0.02, 0.1), [9, 2, 7]).0,
     ] {
-        let lattice = Lattice::around(&surface, default_cell_m(&surface), 1000.0)
+        let lattice = Lattice::around(&surface, cells_for(&surface).cell_m, 1000.0)
             .expect("the default cell is in range");
         let tets = lattice.tets.tets.len();
         assert!((3_000..8_000).contains(&tets), "{tets} tetrahedra");
     }
+}
+
+#[test]
+fn thin_bodies_get_cells_no_thicker_than_they_are_within_the_budget() {
+    // A sheet of 3 mm, a rod of 4 mm, a plate of a tenth of a millimetre: side lengths of a box [m].
+    for (extent, cell_mm) in [
+        (Vec3::new(0.1, 0.1, 0.003), 2.9..3.1),
+        (Vec3::new(0.3, 0.004, 0.004), 0.9..1.9),
+        (Vec3::new(0.1, 0.1, 0.000_1), 1.0..4.0),
+    ] {
+        let surface = block_of_cells(extent, [1, 1, 1]).0;
+        let cells = cells_for(&surface);
+        assert!(
+            cell_mm.contains(&(1e3 * cells.cell_m)),
+            "{extent}: {cells:?}"
+        );
+        let lattice = Lattice::around(&surface, cells.cell_m, 1000.0).expect("it is in range");
+        let tets = lattice.tets.tets.len();
+        assert!(tets < 30_000, "{extent}: {tets} tetrahedra");
+        let thinnest = extent.min_element();
+        assert!(
+            (cells.thin_m / thinnest - 1.0).abs() < 0.01,
+            "{extent}: {cells:?}"
+        );
+    }
+    // What is thick everywhere keeps the cells of its volume.
+    let surface = ball(0.05);
+    let by_volume_m = cell_for_volume_m(surface.volume_m3() as f32);
+    assert_eq!(cells_for(&surface).cell_m, by_volume_m);
+    assert!((cells_for(&surface).thin_m / 0.1 - 1.0).abs() < 0.02);
 }
 
 #[test]
@@ -142,7 +172,7 @@ fn real_liver_has_a_lattice_of_its_mass() {
         .collect();
     let triangles = mesh.indices.chunks(3).map(|t| [t[0], t[1], t[2]]).collect();
     let surface = bare(points, triangles);
-    for cell_m in [default_cell_m(&surface), 0.006] {
+    for cell_m in [cells_for(&surface).cell_m, 0.006] {
         let lattice = Lattice::around(&surface, cell_m, 1060.0).expect("the liver has a lattice");
         assert!(is_conforming(&lattice.tets));
         let error = (total_kg(&lattice) / (1060.0 * surface.volume_m3()) - 1.0).abs();

@@ -176,7 +176,7 @@ impl Canvas {
 }
 
 /// Barycentric weights of a place in the plane; `None` in a triangle without area.
-fn barycentric(at: Vec2, [a, b, c]: [Vec2; 3]) -> Option<[f32; 3]> {
+pub fn barycentric(at: Vec2, [a, b, c]: [Vec2; 3]) -> Option<[f32; 3]> {
     let whole = (b - a).perp_dot(c - a);
     if whole.abs() < 1e-9 {
         return None;
