@@ -1,7 +1,8 @@
 //! The live knobs of the surfaces after Green (2004).
 
+use super::slider::{DragValue, Slider};
 use crate::scene::{DISC_SAMPLES_MAX, DiffusionCore, Falloff, SurfaceSection};
-use egui::{Slider, Ui};
+use egui::Ui;
 
 /// Wrapped light and its table.
 pub fn lookup(ui: &mut Ui, surface: &mut SurfaceSection) {
@@ -10,7 +11,7 @@ pub fn lookup(ui: &mut Ui, surface: &mut SurfaceSection) {
     ui.add(Slider::new(&mut lookup.scatter_width, 0.01..=1.0).text("scatter width"));
     ui.horizontal(|ui| {
         for value in &mut lookup.scatter_color {
-            ui.add(egui::DragValue::new(value).range(0.0..=2.0).speed(0.01));
+            ui.add(DragValue::new(value).range(0.0..=2.0).speed(0.01));
         }
         ui.label("scatter colour");
     });

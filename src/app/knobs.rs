@@ -2,14 +2,14 @@
 
 use super::green_knobs as green;
 use super::panel::PanelAsk;
+use super::slider::{DragValue, Slider};
 use crate::scene::{
     InnerLight, InnerTaps, Noise, Quadrature, SurfaceKind, SurfaceSection, UvMetric,
 };
-use egui::{ComboBox, Slider, Ui};
+use egui::{ComboBox, Ui};
 
-/// Shows the knobs of the surface's own kind; returns what a change needs.
-pub fn surface(ui: &mut Ui, surface: &mut SurfaceSection) -> Option<PanelAsk> {
-    let before = surface.clone();
+/// Shows the knobs of the surface's own kind.
+pub fn surface(ui: &mut Ui, surface: &mut SurfaceSection) {
     match surface.kind {
         SurfaceKind::Plain => {}
         SurfaceKind::Subsurface => subsurface(ui, surface),
@@ -39,8 +39,13 @@ pub fn surface(ui: &mut Ui, surface: &mut SurfaceSection) -> Option<PanelAsk> {
     ui.add(Slider::new(&mut surface.roughness, 0.05..=0.8).text("roughness"));
     ui.add(Slider::new(&mut surface.wetness, 0.0..=2.0).text("wetness"));
     ui.add(Slider::new(&mut surface.exposure, 0.1..=4.0).text("exposure"));
+}
+
+/// What a change of the knobs asks for.
+pub fn ask(before: &SurfaceSection, after: &SurfaceSection) -> PanelAsk {
     let rebuilt = |s: &SurfaceSection| {
         (
+            (s.kind, s.layers.len()),
             (s.samples, s.quadrature, s.blur_passes, s.light_map_size_px),
             (s.uv_metric, s.thickness_follows_volume),
             (s.inner.len(), s.inner_taps, s.inner_light),
@@ -48,12 +53,10 @@ pub fn surface(ui: &mut Ui, surface: &mut SurfaceSection) -> Option<PanelAsk> {
             green::rebuilt(s),
         )
     };
-    if rebuilt(surface) != rebuilt(&before) {
-        Some(PanelAsk::Rebuild)
-    } else if *surface != before {
-        Some(PanelAsk::SurfaceKnobs)
+    if rebuilt(after) == rebuilt(before) {
+        PanelAsk::SurfaceKnobs
     } else {
-        None
+        PanelAsk::Rebuild
     }
 }
 
@@ -127,7 +130,7 @@ fn subsurface(ui: &mut Ui, surface: &mut SurfaceSection) {
             ] {
                 ui.horizontal(|ui| {
                     for value in coefficients {
-                        ui.add(egui::DragValue::new(value).range(0.1..=20_000.0).speed(5.0));
+                        ui.add(DragValue::new(value).range(0.1..=20_000.0).speed(5.0));
                     }
                     ui.label(name);
                 });
@@ -192,7 +195,7 @@ fn gooey(ui: &mut Ui, surface: &mut SurfaceSection) {
             ui.add(Slider::new(&mut layer.opacity, 0.0..=1.0).text("opacity"));
             ui.horizontal(|ui| {
                 for value in &mut layer.color {
-                    ui.add(egui::DragValue::new(value).range(0.0..=4.0).speed(0.01));
+                    ui.add(DragValue::new(value).range(0.0..=4.0).speed(0.01));
                 }
                 ui.label("colour");
             });

@@ -1,6 +1,7 @@
 //! Where everything meets: sessions, the replay, the window, and the commands that read and list.
 
 mod assets;
+mod changes;
 mod check;
 mod dump;
 mod error;
@@ -12,12 +13,16 @@ mod knobs;
 mod light_error;
 mod load;
 mod orbit;
+mod overlay;
 mod panel;
+mod push;
 mod record;
 mod renderer;
 mod replay;
 mod script;
+mod section;
 mod session;
+mod slider;
 mod still;
 mod take;
 mod validate;
