@@ -2,7 +2,7 @@
 
 use super::green_knobs as green;
 use super::panel::PanelAsk;
-use super::slider::{DragValue, Slider};
+use super::slider::{Slider, three};
 use crate::scene::{
     InnerLight, InnerTaps, Noise, Quadrature, SurfaceKind, SurfaceSection, UvMetric,
 };
@@ -128,12 +128,7 @@ fn subsurface(ui: &mut Ui, surface: &mut SurfaceSection) {
                 ("absorption [1/m]", &mut layer.absorption_per_m),
                 ("scattering [1/m]", &mut layer.scattering_per_m),
             ] {
-                ui.horizontal(|ui| {
-                    for value in coefficients {
-                        ui.add(DragValue::new(value).range(0.1..=20_000.0).speed(5.0));
-                    }
-                    ui.label(name);
-                });
+                three(ui, coefficients, 0.1..=20_000.0, 5.0, name);
             }
             ui.add(Slider::new(&mut layer.asymmetry, -0.9..=0.9).text("asymmetry"));
         }
@@ -193,12 +188,7 @@ fn gooey(ui: &mut Ui, surface: &mut SurfaceSection) {
             ui.label(format!("inner layer {}", index + 1));
             ui.add(Slider::new(&mut layer.distance, 0.0..=8.0).text("distance [layer distances]"));
             ui.add(Slider::new(&mut layer.opacity, 0.0..=1.0).text("opacity"));
-            ui.horizontal(|ui| {
-                for value in &mut layer.color {
-                    ui.add(DragValue::new(value).range(0.0..=4.0).speed(0.01));
-                }
-                ui.label("colour");
-            });
+            three(ui, &mut layer.color, 0.0..=4.0, 0.01, "colour");
         }
     });
 }

@@ -12,6 +12,12 @@ use std::collections::HashMap;
 /// Half the length of the cut, in depths of the deepest layer.
 const HALF_LENGTH: f32 = 2.5;
 
+/// Places that are looked at across a triangle: the map of the layers is finer than the mesh.
+const STEPS: usize = 8;
+
+/// A triangle that the plane crosses, and the edges that it comes in and goes out by.
+type Crossed = [usize; 3];
+
 /// A cut across the surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
@@ -216,13 +222,18 @@ impl<'a> Walk<'a> {
 
     /// Places of the cut up to half its length either way, in order along it.
     fn both_ways(&self, start: usize, half_length_m: f32) -> Vec<Cut> {
-        let mut ways = self.met_edges(start).into_iter();
-        let (Some(first), Some(second)) = (ways.next(), ways.next()) else {
+        let [first, second] = self.met_edges(start)[..] else {
             return Vec::new();
         };
-        let mut cuts = self.one_way(start, first, half_length_m);
-        cuts.reverse();
-        cuts.extend(self.one_way(start, second, half_length_m));
+        let before = self.one_way(start, first, half_length_m);
+        let mut crossed: Vec<Crossed> = (before.into_iter().rev())
+            .map(|[triangle, from, to]| [triangle, to, from])
+            .collect();
+        crossed.push([start, first, second]);
+        crossed.extend(self.one_way(start, second, half_length_m));
+        let mut cuts: Vec<Cut> = (crossed.into_iter())
+            .flat_map(|crossed| self.cuts(crossed))
+            .collect();
         let ends = cuts.first().zip(cuts.last());
         if ends.is_some_and(|(first, last)| first.at_m.x > last.at_m.x) {
             cuts.reverse();
@@ -230,46 +241,89 @@ impl<'a> Walk<'a> {
         cuts
     }
 
-    fn one_way(&self, start: usize, edge: usize, half_length_m: f32) -> Vec<Cut> {
+    /// The triangles that are crossed behind `edge` of `start`.
+    fn one_way(&self, start: usize, edge: usize, half_length_m: f32) -> Vec<Crossed> {
         let (mut triangle, mut edge) = (start, edge);
-        let mut cuts = Vec::new();
+        let mut crossed = Vec::new();
         // Each triangle is left once; a cut round the body ends where it began.
         for _ in 0..self.across.len() {
+            let from_start = self.place_m(triangle, edge) - self.plane.origin;
+            if self.plane.in_plane(from_start).x.abs() > half_length_m {
+                break;
+            }
             let key = self.key(triangle, edge);
             let Some(&next) = (self.across[&key].iter()).find(|&&other| other != triangle) else {
                 break;
             };
-            let cut = self.cut(triangle, edge, next);
-            let is_far = cut.at_m.x.abs() > half_length_m;
-            cuts.push(cut);
-            let onward = (self.met_edges(next).into_iter()).find(|&k| self.key(next, k) != key);
-            match onward {
-                Some(onward) if !is_far && next != start => (triangle, edge) = (next, onward),
-                _ => break,
+            let [one, other] = self.met_edges(next)[..] else {
+                break;
+            };
+            if next == start {
+                break;
             }
+            let (from, to) = if self.key(next, one) == key {
+                (one, other)
+            } else {
+                (other, one)
+            };
+            crossed.push([next, from, to]);
+            (triangle, edge) = (next, to);
         }
-        cuts
+        crossed
     }
 
-    /// Where the plane meets an edge between two triangles.
-    fn cut(&self, triangle: usize, edge: usize, next: usize) -> Cut {
-        let Layered { points, mesh, .. } = *self.layered;
-        let [k, l] = [edge, (edge + 1) % 3];
+    /// Places across one triangle, both its edges among them.
+    fn cuts(&self, [triangle, from, to]: Crossed) -> Vec<Cut> {
+        let [from, to] = [from, to].map(|edge| {
+            (
+                self.place_m(triangle, edge),
+                self.uv(triangle, edge),
+                self.normal(triangle, edge),
+            )
+        });
+        let thickness = self.layered.thickness(triangle);
+        (0..=STEPS)
+            .map(|step| {
+                let share = step as f32 / STEPS as f32;
+                let place_m = from.0.lerp(to.0, share);
+                let normal = from.2.lerp(to.2, share).normalize_or(self.plane.up);
+                let depths = self.layered.depths_m(from.1.lerp(to.1, share)).into_iter();
+                Cut {
+                    place_m,
+                    at_m: self.plane.in_plane(place_m - self.plane.origin),
+                    down: self.plane.in_plane(-normal),
+                    depths_m: depths.map(|depth| thickness * depth).collect(),
+                }
+            })
+            .collect()
+    }
+
+    /// Corners of an edge, and how far along it the plane meets it.
+    fn met_at(&self, triangle: usize, edge: usize) -> (usize, usize, f32) {
+        let (k, l) = (edge, (edge + 1) % 3);
         let corners = self.triangles[triangle];
-        let [a, b] = [corners[k], corners[l]].map(|i| i as usize);
-        let share = self.sides[a] / (self.sides[a] - self.sides[b]);
-        let place_m = points[a].lerp(points[b], share);
-        let vertices = mesh.triangles[triangle];
-        let uv = mesh.uvs[vertices[k] as usize].lerp(mesh.uvs[vertices[l] as usize], share);
-        let normal = (self.area(triangle) + self.area(next)).normalize_or(self.plane.up);
-        let thickness = 0.5 * (self.layered.thickness(triangle) + self.layered.thickness(next));
-        let depths = self.layered.depths_m(uv).into_iter();
-        Cut {
-            place_m,
-            at_m: self.plane.in_plane(place_m - self.plane.origin),
-            down: self.plane.in_plane(-normal),
-            depths_m: depths.map(|depth| thickness * depth).collect(),
-        }
+        let [a, b] = [k, l].map(|k| self.sides[corners[k] as usize]);
+        (k, l, a / (a - b))
+    }
+
+    fn place_m(&self, triangle: usize, edge: usize) -> Vec3 {
+        let (k, l, share) = self.met_at(triangle, edge);
+        let corner = |k: usize| self.layered.points[self.triangles[triangle][k] as usize];
+        corner(k).lerp(corner(l), share)
+    }
+
+    fn uv(&self, triangle: usize, edge: usize) -> Vec2 {
+        let (k, l, share) = self.met_at(triangle, edge);
+        let mesh = self.layered.mesh;
+        let corner = |k: usize| mesh.uvs[mesh.triangles[triangle][k] as usize];
+        corner(k).lerp(corner(l), share)
+    }
+
+    /// Of the triangles at an edge, by their areas.
+    fn normal(&self, triangle: usize, edge: usize) -> Vec3 {
+        let sharing = &self.across[&self.key(triangle, edge)];
+        let area: Vec3 = sharing.iter().map(|&triangle| self.area(triangle)).sum();
+        area.normalize_or(self.plane.up)
     }
 
     fn area(&self, triangle: usize) -> Vec3 {

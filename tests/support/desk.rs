@@ -139,6 +139,8 @@ impl Desk {
     pub fn open(&self, path: &str) {
         // The field below the title.
         self.tool(&["mousemove", "960", "62", "click", "1"]);
+        // A slow machine takes a second to a frame, and the field has the keys from the next one on.
+        sleep(Duration::from_secs(3));
         self.tool(&["key", "ctrl+a"]);
         self.tool(&["type", path]);
         self.tool(&["key", "Return"]);

@@ -70,14 +70,16 @@ pub fn keys(ui: &Ui, state: &mut PanelState) {
         .open(&mut state.help_open)
         .resizable(false)
         .show(ui.ctx(), |ui| {
-            egui::ScrollArea::vertical().show(ui, |ui| {
-                egui::Grid::new("keys").num_columns(2).show(ui, |ui| {
-                    for (what, does) in KEYS {
-                        ui.strong(what);
-                        ui.label(does);
-                        ui.end_row();
-                    }
+            egui::ScrollArea::vertical()
+                .max_height(680.0)
+                .show(ui, |ui| {
+                    egui::Grid::new("keys").num_columns(2).show(ui, |ui| {
+                        for (what, does) in KEYS {
+                            ui.strong(what);
+                            ui.label(does);
+                            ui.end_row();
+                        }
+                    });
                 });
-            });
         });
 }

@@ -5,7 +5,7 @@ use crate::app::Session;
 use crate::app::hand::HandKnobs;
 use crate::app::light_error::ErrorMap;
 use crate::app::orbit::Side;
-use crate::app::slider::{DragValue, Slider};
+use crate::app::slider::{Slider, three};
 use crate::geom::plane::LightPathMethod;
 use crate::passes::frame::{patch_radius_m, tolerance_m};
 use crate::scene::{LightSection, SurfaceKind};
@@ -63,7 +63,7 @@ pub fn light_path(
     let (mut radius_m, mut step_m) = (patch_radius_m(&session.scene), tolerance_m(&session.scene));
     let path = &mut session.scene.light_path;
     let method = &mut path.method;
-    ComboBox::from_id_salt("light path")
+    ComboBox::from_label("primitive")
         .selected_text(method.name())
         .show_ui(ui, |ui| {
             for other in LightPathMethod::ALL {
@@ -151,28 +151,13 @@ fn direction(ui: &mut Ui, toward: &mut Vec3) {
     }
 }
 
-fn three(
-    ui: &mut Ui,
-    values: &mut [f32; 3],
-    range: std::ops::RangeInclusive<f32>,
-    speed: f64,
-    label: &str,
-) {
-    ui.horizontal(|ui| {
-        for value in values {
-            ui.add(DragValue::new(value).range(range.clone()).speed(speed));
-        }
-        ui.label(label);
-    });
-}
-
 /// How the body moves.
 pub fn solver(ui: &mut Ui, session: &mut Session) {
     ui.separator();
     ui.strong("Solver");
     let taken = session.solver();
     let solver = &mut session.scene.solver;
-    ComboBox::from_id_salt("solver")
+    ComboBox::from_label("method")
         .selected_text(solver.method.name())
         .show_ui(ui, |ui| {
             for method in Method::ALL {

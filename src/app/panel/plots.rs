@@ -120,6 +120,7 @@ fn push_plot(ui: &mut Ui, push: &PushCurve) {
     let points = push.points();
     let last = points.last().copied();
     still_plot("push")
+        .include_x(0.0)
         .show_axes(true)
         .height(110.0)
         .show(ui, |plot| {

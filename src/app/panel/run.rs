@@ -18,7 +18,8 @@ pub fn section(
     ui.add_space(6.0);
     ui.horizontal(|ui| {
         ui.heading("palpate");
-        ComboBox::from_id_salt("scene")
+        ComboBox::from_label("scene")
+            .truncate()
             .selected_text(&state.scene_name)
             .show_ui(ui, |ui| {
                 for (name, _) in assets::scenes() {

@@ -2,6 +2,7 @@
 
 use crate::app::Session;
 use crate::app::section::{Cut, Section};
+use crate::measure::chart::number;
 use egui::epaint::Vertex;
 use egui::{Align2, Color32, FontId, Mesh, Painter, Pos2, Rect, Shape, Stroke, Ui, pos2, vec2};
 use glam::Vec2;
@@ -65,7 +66,7 @@ pub fn paint(ui: &Ui, rect: Rect, session: &Session, section: Option<&Section>) 
     let end = inset.right_bottom() + vec2(-10.0, -10.0);
     let start = end - vec2(scale * ruler_m, 0.0);
     painter.line_segment([start, end], Stroke::new(2.0, Color32::WHITE));
-    let text = format!("{} mm", 1e3 * ruler_m);
+    let text = format!("{} mm", number(f64::from(1e3 * ruler_m)));
     say(
         start.lerp(end, 0.5) - vec2(0.0, 3.0),
         Align2::CENTER_BOTTOM,

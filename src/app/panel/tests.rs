@@ -64,7 +64,8 @@ fn another_value(slider: &Node<'_>) -> f64 {
     let high = node.max_numeric_value().expect("a slider has a range");
     let now = node.numeric_value().expect("a slider has a value");
     let middle = low + 0.37 * (high - low);
-    if (middle - now).abs() > 1e-3 * (high - low) {
+    // Whole numbers are rounded to.
+    if (middle - now).abs() > f64::min(1.0, 0.1 * (high - low)) {
         middle
     } else {
         high
