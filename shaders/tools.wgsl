@@ -1,8 +1,7 @@
 // Rigid tools: spheres and capsules of polished steel, drawn over the tissue with its depth. Towards a round outline
-// (n.v)^2 falls to zero evenly with the distance from it, so its slope says how much of a pixel is covered.
+// (n.v)^2 falls to zero evenly with the distance from it, so its slope says how much of a pixel is covered. Follows tone.wgsl and capsule.wgsl.
 //
-//   x = tip + r n'          for the half that faces away from the axis
-//   x = tip + axis + r n'   for the other half; n' = n turned so that +z lies along the axis
+//   L = F(n.v) L_room(reflect(-v, n))
 //
 // Source:  Schlick, "An Inexpensive BRDF Model for Physically-based Rendering", 1994 (Fresnel term);
 //          the rest is a lamp above, a lamp beside and a dark floor, by eye.
@@ -21,11 +20,6 @@ struct View {
     eye_exposure: vec4f,
 }
 
-struct Tool {
-    tip_radius: vec4f,
-    axis: vec4f,
-}
-
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<storage, read> tools: array<Tool>;
 @group(0) @binding(2) var<storage, read> directions: array<vec4f>;
@@ -38,21 +32,8 @@ struct Varyings {
 
 @vertex
 fn vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) index: u32) -> Varyings {
-    let tool = tools[index];
-    let n = directions[corner];
-    let length = length(tool.axis.xyz);
-    var along = vec3f(0.0, 0.0, 1.0);
-    if length > 1e-6 {
-        along = tool.axis.xyz / length;
-    }
-    var side = vec3f(1.0, 0.0, 0.0);
-    if abs(along.x) > 0.9 {
-        side = vec3f(0.0, 1.0, 0.0);
-    }
-    let across = normalize(cross(side, along));
-    let normal = n.x * across + n.y * cross(along, across) + n.z * along;
-    let world = tool.tip_radius.xyz + n.w * tool.axis.xyz + tool.tip_radius.w * normal;
-    return Varyings(view.clip_from_world * vec4f(world, 1.0), world, normal);
+    let on = on_tool(tools[index], directions[corner]);
+    return Varyings(view.clip_from_world * vec4f(on.world, 1.0), on.world, on.normal);
 }
 
 // What a polished surface mirrors in this room: two soft lamps and a floor.

@@ -43,6 +43,7 @@ fn shaders() -> Vec<(&'static str, &'static [Wgsl])> {
         ("quadrics", Fit::Quadric.wgsl()),
         ("geometry", Geometry::WGSL),
         ("shadow", Shadow::WGSL),
+        ("shadow of the tools", Shadow::TOOLS_WGSL),
         ("light map", LightMap::WGSL),
         ("blur", LightMap::BLUR_WGSL),
         (

@@ -704,6 +704,78 @@ fn a_shadow_falls_where_the_way_to_the_lamp_is_blocked() {
     assert!(brightest < 0.6, "what is blocked is still lit: {brightest}");
 }
 
+/// Brightness with the shadow over that without, where the way to the lamp passes a ball of [`BALL_RADIUS_M`] at
+/// `ball`, and where it does not.
+fn ball_shadow(name: &str, place: DVec3, ball: DVec3) -> [Vec<f64>; 2] {
+    let lamp = DVec3::new(-0.3, 0.9, 0.2);
+    let files = folder(&format!("{name}-scene"));
+    let scene = files.join("ball.toml");
+    let [x, y, z] = place.to_array();
+    let text = format!(
+        "[body]\nshape = \"slab\"\nextent_m = [0.1, 0.03, 0.1]\ncell_m = 0.01\n[surface]\nkind = \"plain\"\n\
+         [camera]\ndirection = [0.2, 1.0, 0.7]\n\
+         [[tool]]\nradius_m = {BALL_RADIUS_M}\nkeys = [{{ at_s = 0.0, action = \"idle\", at_m = [{x}, {y}, {z}] }}]\n"
+    );
+    std::fs::write(&scene, text).expect("written");
+    let dump = |shadow: bool| {
+        let run = Run::new(
+            &format!("{name}-{shadow}"),
+            &format!(
+                "{} --size 160x120 --frames 1 --dump 1 --set light=[{{toward=[-0.3,0.9,0.2],\
+                 irradiance_w_m2=[3.0,3.0,3.0],shadow={shadow}}}]",
+                scene.display()
+            ),
+        );
+        Dump::read(&run.out, 1)
+    };
+    let (with, without) = (dump(true), dump(false));
+    let lamp = lamp.normalize();
+    let [mut blocked, mut open] = [Vec::new(), Vec::new()];
+    let depths = with.pixels("depth", 1);
+    let pairs = with.brightness().into_iter().zip(without.brightness());
+    for ((seen, (shadowed, lit)), depth) in with.drawn().iter().zip(pairs).zip(depths) {
+        // The top of the slab, where the ball itself does not hide it.
+        let Some(seen) =
+            seen.filter(|seen| seen.normal.y > 0.9 && (seen.depth - depth).abs() < 1e-3)
+        else {
+            continue;
+        };
+        let to_ball = ball - seen.world;
+        let off_m = (to_ball - to_ball.dot(lamp) * lamp).length();
+        if off_m < 0.85 * BALL_RADIUS_M {
+            blocked.push(shadowed / lit);
+        } else if off_m > 1.25 * BALL_RADIUS_M {
+            open.push(shadowed / lit);
+        }
+    }
+    [blocked, open]
+}
+
+const BALL_RADIUS_M: f64 = 0.012;
+
+#[test]
+fn a_tool_shades_what_lies_behind_it() {
+    // Above the slab, so far that it stands before the map's front, which is fitted round the body.
+    let ball = DVec3::new(0.03, 0.08, 0.055);
+    let [blocked, open] = ball_shadow("tool-shadow", ball, ball);
+    let brightest = percentile(blocked.iter().copied(), 0.95);
+    let darkest = percentile(open.iter().copied(), 0.05);
+    let counts = [blocked.len(), open.len()];
+    println!("{counts:?} blocked and open, {brightest:.3} at most and {darkest:.3} at least");
+    assert!(counts[0] > 100 && counts[1] > 1000, "{counts:?}");
+    assert!(brightest < 0.6, "what is blocked is still lit: {brightest}");
+    assert!(darkest > 0.95, "the open side is darkened to {darkest}");
+}
+
+#[test]
+fn the_tool_shadow_check_sees_a_shadow_that_is_not_there() {
+    // Sabotage: the ball is not where the check thinks it is.
+    let ball = DVec3::new(0.03, 0.08, 0.055);
+    let [blocked, _] = ball_shadow("tool-elsewhere", ball + 0.5 * DVec3::X, ball);
+    let brightest = percentile(blocked.iter().copied(), 0.95);
+    assert!(brightest > 0.95, "{brightest}");
+}
+
 /// Whether a place on [`floor_and_wall`] is away from the edges of its square.
 fn is_inside_a_square(seen: &Seen) -> bool {
     (0..3).all(|axis| {

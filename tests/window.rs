@@ -1,134 +1,33 @@
 //! The window, driven by a real mouse under Xvfb: the organ moves, it pushes back, the picture changes.
 //!
-//! Needs Xvfb and xdotool, which `make test` installs. Where they are missing the test says so; in CI that is
+//! Needs Xvfb and xdotool, which `make test` installs. Where they are missing the tests say so; in CI that is
 //! a failure.
 
+#[path = "support/desk.rs"]
+mod desk;
+
+use desk::{Desk, spent};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// A child that does not outlive the test.
-struct Guard(Child);
-
-impl Drop for Guard {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+/// A push that is recorded, and the scene file it ends in.
+fn recorded_push(desk: &Desk) -> PathBuf {
+    desk.tool(&["key", "o"]);
+    sleep(Duration::from_millis(500));
+    desk.tool(&["mousedown", "1"]);
+    for step in 0..6 {
+        let y = (350 + 4 * step).to_string();
+        desk.tool(&["mousemove", "440", &y]);
+        sleep(Duration::from_millis(150));
     }
-}
-
-/// An X server of our own and the folder that the window saves into.
-struct Desk {
-    display: String,
-    folder: PathBuf,
-    _server: Guard,
-}
-
-impl Desk {
-    fn new(name: &str, number: u32) -> Option<Self> {
-        for program in ["Xvfb", "xdotool"] {
-            if Command::new(program)
-                .arg(if program == "Xvfb" {
-                    "-help"
-                } else {
-                    "version"
-                })
-                .stdout(Stdio::null())
-                .stderr(Stdio::null())
-                .status()
-                .is_err()
-            {
-                assert!(
-                    std::env::var_os("CI").is_none(),
-                    "{program} is missing; `make test` installs it"
-                );
-                println!("{program} is missing: the window was not tested");
-                return None;
-            }
-        }
-        let folder = std::env::temp_dir().join(format!("palpate-{name}-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).expect("a temporary folder");
-        let display = format!(":{number}");
-        let server = Command::new("Xvfb")
-            .args([&display, "-screen", "0", "1280x800x24", "-nolisten", "tcp"])
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("Xvfb starts");
-        let desk = Self {
-            display,
-            folder,
-            _server: Guard(server),
-        };
-        desk.wait_for("the X server", || {
-            desk.try_tool(&["getmouselocation"]).is_some()
-        });
-        Some(desk)
-    }
-
-    fn try_tool(&self, arguments: &[&str]) -> Option<String> {
-        let output = Command::new("xdotool")
-            .args(arguments)
-            .env("DISPLAY", &self.display)
-            .stderr(Stdio::null())
-            .output()
-            .ok()?;
-        output
-            .status
-            .success()
-            .then(|| String::from_utf8_lossy(&output.stdout).into_owned())
-    }
-
-    fn tool(&self, arguments: &[&str]) -> String {
-        self.try_tool(arguments)
-            .unwrap_or_else(|| panic!("xdotool {arguments:?} failed"))
-    }
-
-    fn wait_for(&self, what: &str, mut ready: impl FnMut() -> bool) {
-        let start = Instant::now();
-        while !ready() {
-            assert!(
-                start.elapsed() < Duration::from_secs(120),
-                "waited two minutes for {what}"
-            );
-            sleep(Duration::from_millis(100));
-        }
-    }
-
-    /// Presses the key that saves a picture, and waits for the file.
-    fn picture(&self, number: u32) -> image::RgbaImage {
-        self.tool(&["key", "s"]);
-        let path = self.folder.join(format!("palpate-{number:03}.png"));
-        self.wait_for("a picture", || path.exists());
-        image::open(path).expect("a sound PNG").to_rgba8()
-    }
-}
-
-impl Desk {
-    /// A push that is recorded, and the scene file it ends in.
-    fn recorded_push(&self) -> PathBuf {
-        self.tool(&["key", "o"]);
-        sleep(Duration::from_millis(500));
-        self.tool(&["mousedown", "1"]);
-        for step in 0..6 {
-            let y = (350 + 4 * step).to_string();
-            self.tool(&["mousemove", "440", &y]);
-            sleep(Duration::from_millis(150));
-        }
-        self.tool(&["mouseup", "1"]);
-        sleep(Duration::from_millis(300));
-        self.tool(&["key", "o"]);
-        let path = self.folder.join("palpate-001.toml");
-        self.wait_for("a recording", || path.exists());
-        path
-    }
-}
-
-impl Drop for Desk {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.folder);
-    }
+    desk.tool(&["mouseup", "1"]);
+    sleep(Duration::from_millis(300));
+    desk.tool(&["key", "o"]);
+    let path = desk.folder.join("palpate-001.toml");
+    desk.wait_for("a recording", || path.exists());
+    path
 }
 
 fn column(log: &Path, name: &str) -> Vec<f32> {
@@ -162,27 +61,8 @@ fn a_mouse_push_moves_the_organ_is_answered_by_a_force_and_changes_the_picture()
         return;
     };
     let log = desk.folder.join("frames.csv");
-    let mut window = Guard(
-        Command::new(env!("CARGO_BIN_EXE_palpate"))
-            .args(["window", "liver-gooey", "--log"])
-            .arg(&log)
-            .current_dir(&desk.folder)
-            .env("DISPLAY", &desk.display)
-            .env_remove("WAYLAND_DISPLAY")
-            .env_remove("WAYLAND_SOCKET")
-            .stdout(Stdio::null())
-            .spawn()
-            .expect("the window starts"),
-    );
-    let mut id = String::new();
-    desk.wait_for("the window", || {
-        id = desk
-            .try_tool(&["search", "--name", "^palpate$"])
-            .unwrap_or_default();
-        !id.trim().is_empty()
-    });
-    let id = id.lines().next().unwrap_or_default().trim();
-    desk.tool(&["windowfocus", "--sync", id]);
+    let log_name = log.display().to_string();
+    let mut window = desk.window("liver-gooey", &["--log", &log_name]);
 
     // The middle of the picture, left of the panel: the organ is there.
     desk.tool(&["mousemove", "430", "360"]);
@@ -196,13 +76,8 @@ fn a_mouse_push_moves_the_organ_is_answered_by_a_force_and_changes_the_picture()
     }
     let pushed = desk.picture(3);
     desk.tool(&["mouseup", "1"]);
-    let recorded = desk.recorded_push();
-    desk.tool(&["key", "ctrl+q"]);
-    desk.wait_for("the window to close", || {
-        window.0.try_wait().expect("the window's state").is_some()
-    });
-    let status = window.0.wait().expect("the window has ended");
-    assert!(status.success(), "the window ended with {status}");
+    let recorded = recorded_push(&desk);
+    desk.close(&mut window);
 
     let force = column(&log, "tool_force_n").into_iter().fold(0.0, f32::max);
     assert!(force > 0.01, "the organ pushed back with {force} N only");
@@ -242,4 +117,120 @@ fn assert_replays(recorded: &Path) {
     );
     let force_n = summary["tool"]["force_max_n"].as_f64();
     assert!(force_n.is_some_and(|force| force > 0.01), "{force_n:?}");
+}
+
+#[test]
+fn overlays_sides_and_bad_files_change_the_picture_and_end_nothing() {
+    let Some(desk) = Desk::new("overlays", 72) else {
+        return;
+    };
+    std::fs::write(desk.folder.join("broken.glb"), b"glTF, but not for long").expect("written");
+    let mut window = desk.window("liver", &[]);
+    desk.tool(&["mousemove", "430", "360"]);
+    let front = {
+        desk.tool(&["key", "1"]);
+        desk.picture(1)
+    };
+    desk.tool(&["key", "3"]);
+    let top = desk.picture(2);
+    assert!(
+        changed_share(&front, &top) > 0.05,
+        "from above it looks as from the front"
+    );
+    // Each one on, over the others; the scene's own picture does not hold them.
+    for key in ["v", "t", "l", "b", "x"] {
+        desk.tool(&["key", key]);
+    }
+    let with_overlays = desk.picture(3);
+    assert!(
+        changed_share(&top, &with_overlays) < 0.001,
+        "overlays are in the picture"
+    );
+    for wrong in ["broken.glb", "nowhere.toml", "notes.txt"] {
+        desk.open(wrong);
+        sleep(Duration::from_millis(800));
+        // The message goes, and the scene is still there.
+        desk.tool(&["key", "Escape"]);
+    }
+    let id = desk.id().expect("the window is still there");
+    for [width, height] in [
+        ["600", "400"],
+        ["1279", "799"],
+        ["480", "320"],
+        ["1180", "720"],
+    ] {
+        desk.tool(&["windowsize", &id, width, height]);
+        sleep(Duration::from_millis(300));
+    }
+    desk.tool(&["windowunmap", &id]);
+    sleep(Duration::from_millis(300));
+    desk.tool(&["windowmap", "--sync", &id]);
+    desk.tool(&["windowfocus", "--sync", &id]);
+    desk.tool(&["mousemove", "430", "360"]);
+    let again = desk.picture(4);
+    assert_eq!(again.dimensions(), top.dimensions());
+    assert!(
+        changed_share(&top, &again) < 0.01,
+        "the scene is another after bad files"
+    );
+    desk.close(&mut window);
+}
+
+#[test]
+fn a_saved_scene_opens_to_the_same_picture() {
+    let Some(desk) = Desk::new("saved", 73) else {
+        return;
+    };
+    let mut window = desk.window("slab", &[]);
+    desk.tool(&["mousemove", "430", "360", "mousedown", "2"]);
+    desk.tool(&["mousemove", "500", "380"]);
+    desk.tool(&["mouseup", "2"]);
+    let before = desk.picture(1);
+    desk.tool(&["key", "k"]);
+    let saved = desk.folder.join("palpate-001.toml");
+    desk.wait_for("the saved scene", || saved.exists());
+    desk.tool(&["key", "3"]);
+    let elsewhere = desk.picture(2);
+    assert!(changed_share(&before, &elsewhere) > 0.02);
+    desk.open("palpate-001.toml");
+    sleep(Duration::from_secs(3));
+    let after = desk.picture(3);
+    assert!(
+        changed_share(&before, &after) < 0.002,
+        "the saved scene looks otherwise"
+    );
+    desk.close(&mut window);
+}
+
+/// Processor time that the window takes in a second [s], over `seconds`.
+fn load_of(process: u32, seconds: u64) -> f64 {
+    let before = spent(process).expect("the process is there").0;
+    let start = Instant::now();
+    sleep(Duration::from_secs(seconds));
+    let after = spent(process).expect("the process is there").0;
+    (after - before) / start.elapsed().as_secs_f64()
+}
+
+#[test]
+fn a_window_that_nobody_touches_sleeps() {
+    let Some(desk) = Desk::new("asleep", 74) else {
+        return;
+    };
+    let mut window = desk.window("liver", &[]);
+    let process = window.0.id();
+    desk.tool(&["mousemove", "430", "360"]);
+    // It falls asleep by itself; a button held down keeps it awake.
+    sleep(Duration::from_secs(6));
+    let asleep = load_of(process, 20);
+    desk.tool(&["mousedown", "1"]);
+    sleep(Duration::from_secs(1));
+    let awake = load_of(process, 20);
+    desk.tool(&["mouseup", "1"]);
+    println!(
+        "processor time a second: {asleep:.3} s asleep, {awake:.3} s awake, {:.2} %",
+        100.0 * asleep / awake
+    );
+    // A share of the same machine's work, not a time. What is left asleep is looking ten times a second.
+    assert!(asleep < 0.05 * awake, "{asleep} s asleep, {awake} s awake");
+    desk.close(&mut window);
 }

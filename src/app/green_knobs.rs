@@ -1,19 +1,16 @@
 //! The live knobs of the surfaces after Green (2004).
 
+use super::slider::{Slider, three};
 use crate::scene::{DISC_SAMPLES_MAX, DiffusionCore, Falloff, SurfaceSection};
-use egui::{Slider, Ui};
+use egui::Ui;
 
 /// Wrapped light and its table.
 pub fn lookup(ui: &mut Ui, surface: &mut SurfaceSection) {
     ui.add(Slider::new(&mut surface.wrap, 0.0..=1.0).text("wrap"));
     let lookup = &mut surface.lookup;
     ui.add(Slider::new(&mut lookup.scatter_width, 0.01..=1.0).text("scatter width"));
-    ui.horizontal(|ui| {
-        for value in &mut lookup.scatter_color {
-            ui.add(egui::DragValue::new(value).range(0.0..=2.0).speed(0.01));
-        }
-        ui.label("scatter colour");
-    });
+    let color = &mut lookup.scatter_color;
+    three(ui, color, 0.0..=2.0, 0.01, "scatter colour");
     ui.add(
         Slider::new(&mut lookup.shininess, 1.0..=2000.0)
             .logarithmic(true)

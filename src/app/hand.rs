@@ -72,9 +72,15 @@ impl Hand {
         }
     }
 
-    /// `seconds` went by: a push sinks further.
+    /// `seconds` went by: a push comes nearer to its depth, from above or from below.
     pub fn sink(&mut self, knobs: &HandKnobs, seconds: f32) {
-        self.sunk_m = (self.sunk_m + knobs.speed_m_s * seconds).min(knobs.depth_m);
+        let way_m = knobs.speed_m_s * seconds;
+        self.sunk_m += (knobs.depth_m - self.sunk_m).clamp(-way_m, way_m);
+    }
+
+    /// How deep a push is below the spot that was hit [m]; nothing for a grab.
+    pub fn depth_m(&self) -> Option<f32> {
+        (self.action == ToolAction::Push).then_some(self.sunk_m)
     }
 
     /// The tool as it is now.
@@ -129,6 +135,13 @@ mod tests {
         assert!((hand.tool(&KNOBS).position_m.z - 0.09).abs() < 1e-6);
         hand.sink(&KNOBS, 100.0);
         assert!((hand.tool(&KNOBS).position_m.z - 0.05).abs() < 1e-6);
+        // And out again no faster, when less depth is wanted.
+        let shallow = HandKnobs {
+            depth_m: 0.0,
+            ..KNOBS
+        };
+        hand.sink(&shallow, 0.1);
+        assert!((hand.depth_m().expect("a push") - 0.04).abs() < 1e-6);
     }
 
     #[test]

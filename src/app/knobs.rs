@@ -2,15 +2,15 @@
 
 use super::green_knobs as green;
 use super::panel::PanelAsk;
+use super::slider::{Slider, three};
 use crate::optics::OpticalTissue;
 use crate::scene::{
     InnerLight, InnerTaps, Multiple, Noise, Quadrature, SurfaceKind, SurfaceSection, UvMetric,
 };
-use egui::{ComboBox, Slider, Ui};
+use egui::{ComboBox, Ui};
 
-/// Shows the knobs of the surface's own kind; returns what a change needs.
-pub fn surface(ui: &mut Ui, surface: &mut SurfaceSection) -> Option<PanelAsk> {
-    let before = surface.clone();
+/// Shows the knobs of the surface's own kind.
+pub fn surface(ui: &mut Ui, surface: &mut SurfaceSection) {
     tissue(ui, surface);
     let named = surface.clone();
     match surface.kind {
@@ -45,22 +45,25 @@ pub fn surface(ui: &mut Ui, surface: &mut SurfaceSection) -> Option<PanelAsk> {
     if surface.layers != named.layers {
         surface.tissue = None;
     }
+}
+
+/// What a change of the knobs asks for.
+pub fn ask(before: &SurfaceSection, after: &SurfaceSection) -> PanelAsk {
     let rebuilt = |s: &SurfaceSection| {
         (
+            (s.kind, s.layers.len()),
             (s.samples, s.quadrature, s.blur_passes, s.light_map_size_px),
             (s.uv_metric, s.thickness_follows_volume),
             (s.inner.len(), s.inner_taps, s.inner_light),
             (s.layer_shadow > 0.0, s.noise),
-            (s.tissue, s.layers.len(), s.multiple),
+            (s.tissue, s.multiple),
             green::rebuilt(s),
         )
     };
-    if rebuilt(surface) != rebuilt(&before) {
-        Some(PanelAsk::Rebuild)
-    } else if *surface != before {
-        Some(PanelAsk::SurfaceKnobs)
+    if rebuilt(after) == rebuilt(before) {
+        PanelAsk::SurfaceKnobs
     } else {
-        None
+        PanelAsk::Rebuild
     }
 }
 
@@ -166,12 +169,7 @@ fn subsurface(ui: &mut Ui, surface: &mut SurfaceSection) {
                 ("absorption [1/m]", &mut layer.absorption_per_m),
                 ("scattering [1/m]", &mut layer.scattering_per_m),
             ] {
-                ui.horizontal(|ui| {
-                    for value in coefficients {
-                        ui.add(egui::DragValue::new(value).range(0.1..=20_000.0).speed(5.0));
-                    }
-                    ui.label(name);
-                });
+                three(ui, coefficients, 0.1..=20_000.0, 5.0, name);
             }
             ui.add(Slider::new(&mut layer.asymmetry, -0.9..=0.9).text("asymmetry"));
         }
@@ -231,12 +229,7 @@ fn gooey(ui: &mut Ui, surface: &mut SurfaceSection) {
             ui.label(format!("inner layer {}", index + 1));
             ui.add(Slider::new(&mut layer.distance, 0.0..=8.0).text("distance [layer distances]"));
             ui.add(Slider::new(&mut layer.opacity, 0.0..=1.0).text("opacity"));
-            ui.horizontal(|ui| {
-                for value in &mut layer.color {
-                    ui.add(egui::DragValue::new(value).range(0.0..=4.0).speed(0.01));
-                }
-                ui.label("colour");
-            });
+            three(ui, &mut layer.color, 0.0..=4.0, 0.01, "colour");
         }
     });
 }

@@ -2,6 +2,7 @@
 
 mod assets;
 mod cache;
+mod changes;
 mod check;
 mod dump;
 mod error;
@@ -13,12 +14,16 @@ mod knobs;
 mod light_error;
 mod load;
 mod orbit;
+mod overlay;
 mod panel;
+mod push;
 mod record;
 mod renderer;
 mod replay;
 mod script;
+mod section;
 mod session;
+mod slider;
 mod still;
 mod take;
 mod validate;

@@ -1,6 +1,16 @@
 //! The window's camera: it orbits a place, and turns a cursor into a ray.
 
+use crate::passes::view::View;
+use crate::scene::{CameraSection, RestBox};
 use glam::{Quat, Vec2, Vec3};
+
+/// How steeply a camera looks up or down at most [rad]: short of the poles, where up is undefined.
+const PITCH_MAX: f32 = 1.5;
+
+/// How many times further back a camera stands where the picture is narrower than it is meant for, 4 : 3.
+fn moved_back(aspect: f32) -> f32 {
+    (4.0 / 3.0 / aspect).max(1.0)
+}
 
 /// A half-line in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,6 +19,19 @@ pub struct Ray {
     pub origin: Vec3,
     /// Unit direction.
     pub direction: Vec3,
+}
+
+/// Sides that a body is looked at from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Against the direction that a camera without other words looks in.
+    Front,
+    /// From its right.
+    Right,
+    /// From above.
+    Top,
+    /// As now.
+    Kept,
 }
 
 /// A camera that looks at a place from a distance.
@@ -46,17 +69,80 @@ impl Orbit {
 
     /// Where the camera is [m].
     pub fn eye(&self) -> Vec3 {
+        self.target + self.distance_m * self.back()
+    }
+
+    /// Unit direction from what it looks at to the camera.
+    fn back(&self) -> Vec3 {
         let (sin_yaw, cos_yaw) = self.yaw.sin_cos();
         let (sin_pitch, cos_pitch) = self.pitch.sin_cos();
         let back = Vec3::new(cos_pitch * sin_yaw, sin_pitch, cos_pitch * cos_yaw);
-        self.target + self.distance_m * (Quat::from_rotation_arc(Vec3::Y, self.up) * back)
+        Quat::from_rotation_arc(Vec3::Y, self.up) * back
+    }
+
+    /// Unit direction to the right of the picture.
+    pub fn right(&self) -> Vec3 {
+        self.up.cross(self.back()).normalize_or(Vec3::X)
+    }
+
+    /// The camera as the passes take it.
+    pub fn view(&self) -> View {
+        View {
+            eye: self.eye(),
+            target: self.target,
+            up: self.up,
+            fov_y: self.fov_y,
+        }
+    }
+
+    /// All of a body in a box, from one side, in a picture of this width over height.
+    pub fn seen_from(&self, side: Side, body: &RestBox, aspect: f32) -> Self {
+        let half_turn = std::f32::consts::PI;
+        let (yaw, pitch) = match side {
+            Side::Front => (0.0, 0.0),
+            Side::Right => (0.5 * half_turn, 0.0),
+            Side::Top => (0.0, PITCH_MAX),
+            Side::Kept => (self.yaw, self.pitch),
+        };
+        let turned = Self {
+            yaw,
+            pitch,
+            ..*self
+        };
+        let camera = CameraSection {
+            direction: turned.back(),
+            up: self.up,
+            fov_y_deg: self.fov_y.to_degrees(),
+            ..CameraSection::default()
+        };
+        let (eye, target) = camera.eye_and_target(body);
+        Self {
+            target,
+            distance_m: eye.distance(target),
+            ..turned
+        }
+        .fitted(aspect)
+    }
+
+    /// What a scene says of this camera, as seen in a picture of this width over height.
+    pub fn section(&self, aspect: f32) -> CameraSection {
+        let meant = Self {
+            distance_m: self.distance_m / moved_back(aspect),
+            ..*self
+        };
+        CameraSection {
+            eye_m: Some(meant.eye()),
+            target_m: Some(self.target),
+            up: self.up,
+            fov_y_deg: self.fov_y.to_degrees(),
+            ..CameraSection::default()
+        }
     }
 
     /// Turns by a mouse movement in shares of the window's height.
     pub fn turn(&mut self, by: Vec2) {
         self.yaw -= 3.5 * by.x;
-        // Short of the poles, where up is undefined.
-        self.pitch = (self.pitch + 3.5 * by.y).clamp(-1.5, 1.5);
+        self.pitch = (self.pitch + 3.5 * by.y).clamp(-PITCH_MAX, PITCH_MAX);
     }
 
     /// Moves the target sideways by a mouse movement in shares of the window's height.
@@ -78,7 +164,7 @@ impl Orbit {
     /// sides are not cut off.
     pub fn fitted(&self, aspect: f32) -> Self {
         Self {
-            distance_m: self.distance_m * (4.0 / 3.0 / aspect).max(1.0),
+            distance_m: self.distance_m * moved_back(aspect),
             ..*self
         }
     }
@@ -154,11 +240,55 @@ mod tests {
     }
 
     #[test]
+    fn each_side_shows_all_of_the_body_from_where_it_says() {
+        let body = RestBox {
+            low: Vec3::new(-0.1, 0.0, -0.02),
+            high: Vec3::new(0.1, 0.3, 0.08),
+        };
+        for (side, from) in [
+            (Side::Front, Vec3::Z),
+            (Side::Right, Vec3::X),
+            (Side::Top, Vec3::Y),
+        ] {
+            let seen = orbit().seen_from(side, &body, 1.0);
+            assert!(seen.back().dot(from) > 0.99, "{side:?}: {}", seen.back());
+            let clip_from_world = seen.view().clip_from_world(1.0);
+            for corner in 0..8_u32 {
+                let share = Vec3::from_array([0, 1, 2].map(|k| ((corner >> k) & 1) as f32));
+                let place =
+                    clip_from_world.project_point3(body.low + share * (body.high - body.low));
+                assert!(
+                    place.x.abs() <= 1.0 && place.y.abs() <= 1.0,
+                    "{side:?}: {place}"
+                );
+            }
+        }
+        let kept = orbit().seen_from(Side::Kept, &body, 1.0);
+        assert_eq!((kept.yaw, kept.pitch), (orbit().yaw, orbit().pitch));
+    }
+
+    #[test]
+    fn a_saved_camera_is_the_same_when_it_is_read_in_a_picture_of_any_shape() {
+        let body = RestBox {
+            low: Vec3::ZERO,
+            high: Vec3::ONE,
+        };
+        for aspect in [0.5, 4.0 / 3.0, 2.5] {
+            let camera = orbit().section(aspect);
+            let (eye, target) = camera.eye_and_target(&body);
+            let fov = camera.fov_y_deg.to_radians();
+            let read = Orbit::new(eye, target, camera.up, fov).fitted(aspect);
+            assert!((read.eye() - orbit().eye()).length() < 1e-5, "{aspect}");
+            assert!((read.fov_y - orbit().fov_y).abs() < 1e-6);
+        }
+    }
+
+    #[test]
     fn turning_keeps_the_distance_and_stays_off_the_poles() {
         let mut orbit = orbit();
         let distance_m = orbit.distance_m;
         orbit.turn(Vec2::new(0.3, 9.0));
         assert!((orbit.eye().distance(orbit.target) - distance_m).abs() < 1e-5);
-        assert!(orbit.pitch < std::f32::consts::FRAC_PI_2);
+        assert_eq!(orbit.pitch, PITCH_MAX);
     }
 }

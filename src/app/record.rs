@@ -41,7 +41,8 @@ pub struct Recording {
     scene: String,
     threads: usize,
     records: Vec<FrameRecord>,
-    spans: Vec<Span>,
+    /// For the trace; none where there will be only a log.
+    spans: Option<Vec<Span>>,
     states: States,
     pictures: Vec<(Vec<u8>, String)>,
     moved: Vec<u32>,
@@ -59,7 +60,7 @@ impl Recording {
             scene,
             threads,
             records: Vec::new(),
-            spans: Vec::new(),
+            spans: Some(Vec::new()),
             states: States::default(),
             pictures: Vec::new(),
             moved: Vec::new(),
@@ -68,6 +69,14 @@ impl Recording {
             frozen: 0,
             finite: true,
             first_frame_s: 0.0,
+        }
+    }
+
+    /// The same where only the frame log will be written: an hour of a window is long.
+    pub fn of_log(scene: String, threads: usize) -> Self {
+        Self {
+            spans: None,
+            ..Self::new(scene, threads)
         }
     }
 
@@ -114,9 +123,12 @@ impl Recording {
     }
 
     fn add_spans(&mut self, start: Instant, wall_ms: f32, tick: &Tick, drawn: &Frame) {
+        let Some(spans) = &mut self.spans else {
+            return;
+        };
         let start_us = (start - process_start()).as_secs_f64() * 1e6;
         let mut span = |name: &'static str, category, from_ms: f32, ms: f32, thread| {
-            self.spans.push(Span {
+            spans.push(Span {
                 name: name.into(),
                 category,
                 start_us: start_us + 1e3 * f64::from(from_ms),
@@ -172,7 +184,11 @@ impl Recording {
     ) -> Result<(), AppError> {
         write_frames_csv(&out.join("frames.csv"), &self.records)?;
         let threads = [(0, "frame"), (1, "simulation"), (2, "GPU")];
-        write_trace(&out.join("trace.json"), &self.spans, &threads)?;
+        write_trace(
+            &out.join("trace.json"),
+            self.spans.as_deref().unwrap_or_default(),
+            &threads,
+        )?;
         self.states.write(out)?;
         let summary = self.summary(session, renderer);
         write_summary(&out.join("summary.json"), &summary)?;
@@ -327,6 +343,49 @@ fn thinned(pictures: Vec<(Vec<u8>, String)>) -> Vec<(Vec<u8>, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_log_counts_every_frame_and_says_what_it_costs() {
+        use crate::app::load;
+        use crate::gpu::PassTime;
+        let scene = load::scene("slab", &["body.cell_m=0.01".to_owned()]).expect("a bundled scene");
+        let mut session = Session::new(scene, 1).expect("a sound scene");
+        let mut recording = Recording::new("slab".to_owned(), 1);
+        let (frames, start) = (120, Instant::now());
+        let mut logging_s = 0.0;
+        for _ in 0..frames {
+            let begun = Instant::now();
+            let tick = session.tick();
+            let passes = [
+                "tangents", "shadow", "geometry", "plain", "tools", "tonemap",
+            ];
+            let drawn = Frame {
+                passes: passes
+                    .map(|name| PassTime {
+                        name,
+                        gpu_ms: 0.1,
+                        start_ms: 0.0,
+                    })
+                    .to_vec(),
+                ..Frame::default()
+            };
+            let logged = Instant::now();
+            recording.add(&session, begun, &tick, drawn);
+            logging_s += logged.elapsed().as_secs_f64();
+        }
+        let spans = recording.spans.as_ref().expect("a trace");
+        assert_eq!((recording.records.len(), spans.len()), (frames, 8 * frames));
+        let row = size_of::<FrameRecord>() + 6 * size_of::<(&str, f32)>();
+        println!(
+            "logging: {:.2} us a frame, {:.3} % of {:.2} ms simulated alone; {} bytes a frame, {} without a trace",
+            1e6 * logging_s / frames as f64,
+            100.0 * logging_s / start.elapsed().as_secs_f64(),
+            1e3 * start.elapsed().as_secs_f64() / frames as f64,
+            row + 8 * size_of::<Span>(),
+            row,
+        );
+        assert!(Recording::of_log(String::new(), 1).spans.is_none());
+    }
 
     #[test]
     fn a_report_takes_first_and_last_of_many_pictures() {

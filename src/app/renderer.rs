@@ -112,6 +112,16 @@ impl Renderer {
         self.passes.set_knobs(&self.gpu, &scene.surface);
     }
 
+    /// Takes over lights that were turned or dimmed; other kinds of light need [`Renderer::rebuilt`].
+    pub fn set_lights(&mut self, session: &Session) {
+        self.passes.set_lights(&session.scene, &session.rest);
+    }
+
+    /// The texture maps of the body.
+    pub fn tissue(&self) -> &TissueMaps {
+        &self.tissue
+    }
+
     /// The camera that the scene asks for; moved back where the picture is narrow.
     pub fn scene_orbit(&self, session: &Session) -> Orbit {
         let camera = &session.scene.camera;
@@ -139,12 +149,7 @@ impl Renderer {
         }
         let mut encoder = self.gpu.encoder();
         self.timer.begin_frame();
-        let view = View {
-            eye: orbit.eye(),
-            target: orbit.target,
-            up: orbit.up,
-            fov_y: orbit.fov_y,
-        };
+        let view = orbit.view();
         self.passes.record(
             &self.gpu,
             points,

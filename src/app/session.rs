@@ -159,8 +159,11 @@ impl Session {
         self.set_solver();
     }
 
-    /// Takes over changed solver knobs.
+    /// Takes over changed knobs of the solver, gravity and damping.
     pub fn set_solver(&mut self) {
+        let body = &self.scene.body;
+        self.simulation
+            .set_gravity_and_damping(body.gravity_m_s2, body.damping_per_s);
         self.simulation.set_params(self.scene.solver);
         hand_over_if_stiff(&mut self.simulation);
     }

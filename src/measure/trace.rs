@@ -39,20 +39,39 @@ pub fn write_trace(file: &Path, spans: &[Span], threads: &[(u32, &str)]) -> Resu
             "ph": "M", "pid": 1, "tid": thread, "name": "thread_name", "args": { "name": name },
         })
     });
-    let spans = spans.iter().map(|span| {
-        let mut event = serde_json::to_value(span).expect("a span has string keys");
-        event["ph"] = json!("X");
-        event["pid"] = json!(1);
-        event
-    });
-    let events: Vec<_> = names.chain(spans).collect();
     write_with(file, |out| {
-        serde_json::to_writer(
-            &mut *out,
-            &json!({ "displayTimeUnit": "ms", "traceEvents": events }),
-        )?;
-        out.write_all(b"\n")
+        // Event by event: a run of a hundred thousand frames has a million.
+        out.write_all(b"{\"displayTimeUnit\":\"ms\",\"traceEvents\":[")?;
+        let mut comma: &[u8] = b"";
+        for name in names {
+            out.write_all(comma)?;
+            serde_json::to_writer(&mut *out, &name)?;
+            comma = b",";
+        }
+        for span in spans {
+            out.write_all(comma)?;
+            let (kind, process) = ("X", 1);
+            let event = Event {
+                span,
+                kind,
+                process,
+            };
+            serde_json::to_writer(&mut *out, &event)?;
+            comma = b",";
+        }
+        out.write_all(b"]}\n")
     })
+}
+
+/// A span as the format has it.
+#[derive(Serialize)]
+struct Event<'a> {
+    #[serde(flatten)]
+    span: &'a Span,
+    #[serde(rename = "ph")]
+    kind: &'static str,
+    #[serde(rename = "pid")]
+    process: u32,
 }
 
 #[cfg(test)]

@@ -87,7 +87,11 @@ impl FramePlan {
             (DepthMaps::NAME, scene.lights.len() as u32, by_depth),
             (Exit::NAME, 1, by_depth),
             (BodyDepths::NAME, body_depths, translucent),
-            (Shadow::NAME, 1, shadow && !by_depth && !translucent),
+            (
+                Shadow::NAME,
+                1 + u32::from(!scene.tools.is_empty()),
+                shadow && !by_depth && !translucent,
+            ),
             (LightMap::NAME, 1, light_map),
             (LightMap::BLUR_NAME, blurs, light_map && blurs > 0),
             (Diffusion::NAME, 1, diffusion),
@@ -284,8 +288,9 @@ impl FramePasses {
         };
         // And so do those of light that comes through the body.
         let has_entries = depth_maps.is_some() || scene.surface.is_translucent();
+        let tools = Tools::new(gpu, output)?;
         let shadow = if !has_entries && lights.iter().any(|light| light.shadow) {
-            Some(Shadow::new(gpu, surface_mesh)?)
+            Some(Shadow::new(gpu, surface_mesh, &tools)?)
         } else {
             None
         };
@@ -379,7 +384,7 @@ impl FramePasses {
             },
         )?;
         Ok(Self {
-            tools: Tools::new(gpu, output)?,
+            tools,
             target: Target::new(gpu, "output", size, output.format()),
             backdrop: (output == Output::Picture).then(|| backdrop(gpu, size)),
             output,
@@ -503,6 +508,14 @@ impl FramePasses {
         }
     }
 
+    /// Takes over lights that were turned or dimmed; other kinds of light need [`FramePasses::new`].
+    pub fn set_lights(&mut self, scene: &Scene, rest: &RestBox) {
+        let lights = placed_lights(scene, rest);
+        if light_constants(&lights) == light_constants(&self.lights) {
+            self.lights = lights;
+        }
+    }
+
     /// Takes `colors`, evenly from no way to the longest, for what is left of light that comes through the body.
     pub fn set_ramp(&mut self, gpu: &Gpu, colors: Vec<Vec3>) {
         if let Some(green) = &mut self.green {
@@ -555,7 +568,8 @@ impl FramePasses {
         self.light_path.record(encoder, timer);
         // Where the first light is cut off.
         if let Some(shadow) = &self.shadow {
-            shadow.record(gpu, shadow_from_world, &self.mesh, encoder, timer);
+            let (mesh, map) = (&self.mesh, shadow_from_world);
+            shadow.record(gpu, map, mesh, &self.tools, tools.len(), encoder, timer);
         }
         // Where each light enters.
         if let Some(maps) = &self.depth_maps {

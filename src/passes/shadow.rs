@@ -1,7 +1,8 @@
-//! The shadow map of the light that casts shadows: one draw a frame.
+//! The shadow map of the light that casts shadows: the surface and the tools before it, a draw each.
 
 use super::draw::{DepthUse, Draw, DrawKind, Target, cleared_depth};
 use super::mesh_buffers::MeshBuffers;
+use super::tools::Tools;
 use crate::geom::SurfaceMesh;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, storage, uniform};
 use glam::Mat4;
@@ -9,9 +10,10 @@ use glam::Mat4;
 /// Side of the map [px].
 pub const SIZE_PX: u32 = 768;
 
-/// Depth of the surface as the light sees it.
+/// Depth of surface and tools as the light sees them.
 pub struct Shadow {
     draw: Draw,
+    draw_tools: Draw,
     matrix: wgpu::Buffer,
     /// Corners of the triangles as points: the map needs no texture coordinates.
     indices: wgpu::Buffer,
@@ -26,12 +28,15 @@ impl Shadow {
     /// The WGSL files of this pass, joined in this order.
     pub const WGSL: &'static [Wgsl] = crate::wgsl!["shadow.wgsl"];
 
-    /// Builds the pass for `mesh`.
+    /// The WGSL files by which it draws the tools.
+    pub const TOOLS_WGSL: &'static [Wgsl] = crate::wgsl!["capsule.wgsl", "tool_shadow.wgsl"];
+
+    /// Builds the pass for `mesh` and what `tools` draws.
     ///
     /// # Errors
     ///
     /// [`GpuError::Shader`] if the WGSL does not compile on this adapter.
-    pub fn new(gpu: &Gpu, mesh: &SurfaceMesh) -> Result<Self, GpuError> {
+    pub fn new(gpu: &Gpu, mesh: &SurfaceMesh, tools: &Tools) -> Result<Self, GpuError> {
         let matrix = uniform(gpu, Self::NAME, &Mat4::IDENTITY.to_cols_array());
         let draw = Draw::new(
             gpu,
@@ -50,9 +55,27 @@ impl Shadow {
             },
             &[Binding::Uniform(&matrix)],
         )?;
+        let [places, directions] = tools.bindings();
+        let draw_tools = Draw::new(
+            gpu,
+            &DrawKind {
+                pass: Self::NAME,
+                parts: Self::TOOLS_WGSL,
+                source: &join(Self::TOOLS_WGSL),
+                vertex: "tool_shadow_vertex",
+                attributes: &[],
+                fragment: None,
+                blend: None,
+                depth: DepthUse::Nearest,
+                cull: Some(wgpu::Face::Back),
+                constants: &[],
+            },
+            &[Binding::Uniform(&matrix), places, directions],
+        )?;
         let indices = mesh.point_triangles();
         Ok(Self {
             draw,
+            draw_tools,
             matrix,
             indices: storage(gpu, "shadow triangles", indices.as_flattened())?,
             index_count: 3 * indices.len() as u32,
@@ -60,12 +83,15 @@ impl Shadow {
         })
     }
 
-    /// Adds the draw to `encoder`.
+    /// Adds the draws to `encoder`, of so many of `tools`, which says where they are before the frame is submitted.
+    #[allow(clippy::too_many_arguments)]
     pub fn record(
         &self,
         gpu: &Gpu,
         shadow_from_world: Mat4,
         mesh: &MeshBuffers,
+        tools: &Tools,
+        tool_count: usize,
         encoder: &mut wgpu::CommandEncoder,
         timer: &mut Timer,
     ) {
@@ -82,5 +108,9 @@ impl Shadow {
         pass.set_vertex_buffer(0, mesh.positions.slice(..));
         pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.draw_indexed(0..self.index_count, 0, 0..1);
+        if tool_count > 0 {
+            self.draw_tools.set(&mut pass);
+            tools.draw(&mut pass, tool_count);
+        }
     }
 }

@@ -44,7 +44,7 @@ impl ToolsView {
     }
 }
 
-/// Mirror of `Tool` in `shaders/tools.wgsl`.
+/// Mirror of `Tool` in `shaders/capsule.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 struct ToolData {
@@ -58,6 +58,7 @@ pub struct Tools {
     bindings: wgpu::BindGroup,
     view: wgpu::Buffer,
     tools: wgpu::Buffer,
+    directions: wgpu::Buffer,
     index_buffer: wgpu::Buffer,
     index_count: u32,
 }
@@ -66,7 +67,7 @@ impl Tools {
     /// Name in logs.
     pub const NAME: &'static str = "tools";
     /// The WGSL files of this pass, joined in this order.
-    pub const WGSL: &'static [Wgsl] = crate::wgsl!["tone.wgsl", "tools.wgsl"];
+    pub const WGSL: &'static [Wgsl] = crate::wgsl!["tone.wgsl", "capsule.wgsl", "tools.wgsl"];
 
     /// Builds the pass, to draw what `output` says.
     ///
@@ -152,6 +153,7 @@ impl Tools {
             bindings,
             view,
             tools,
+            directions,
             index_buffer: storage(gpu, "tool triangles", &indices)?,
             index_count: indices.len() as u32,
         })
@@ -202,8 +204,18 @@ impl Tools {
         });
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.bindings, &[]);
+        self.draw(&mut pass, tools.len());
+    }
+
+    /// What a pipeline needs to draw the same tools elsewhere: places and radii, then directions.
+    pub fn bindings(&self) -> [Binding<'_>; 2] {
+        [Binding::Read(&self.tools), Binding::Read(&self.directions)]
+    }
+
+    /// Draws so many tools by the pipeline that is set.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, count: usize) {
         pass.set_index_buffer(self.index_buffer.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(0..self.index_count, 0, 0..tools.len() as u32);
+        pass.draw_indexed(0..self.index_count, 0, 0..count as u32);
     }
 }
 
@@ -241,7 +253,7 @@ fn unit_capsule() -> (Vec<[f32; 4]>, Vec<u32>) {
     (directions, indices)
 }
 
-/// Where the vertex shader puts a direction: twin of `vertex` in `shaders/tools.wgsl`.
+/// Where the vertex shader puts a direction: twin of `on_tool` in `shaders/capsule.wgsl`.
 #[cfg(test)]
 fn capsule_point(tool: &DrawnTool, n: [f32; 4]) -> Vec3 {
     let along = tool.axis_m.try_normalize().unwrap_or(Vec3::Z);

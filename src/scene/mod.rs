@@ -179,6 +179,17 @@ impl Scene {
         Ok(scene)
     }
 
+    /// The scene with `--set` overrides, each `dotted.key=value`.
+    ///
+    /// # Errors
+    ///
+    /// As [`Scene::read`].
+    pub fn with(&self, sets: &[String]) -> Result<Self, SceneError> {
+        let scene = overrides::apply("the scene", self.clone(), sets)?;
+        scene.check("the scene")?;
+        Ok(scene)
+    }
+
     /// The scene as TOML, readable by [`Scene::read`].
     ///
     /// # Errors
