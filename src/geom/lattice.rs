@@ -145,7 +145,7 @@ impl Lattice {
         }
 
         let inside = Inside::of(surface, &grid);
-        let volume_m3 = enclosed_volume_m3(surface, inside.volume_m3, f64::from(cell_m) / longest);
+        let volume_m3 = enclosed_volume_m3(surface, inside.volumes_m3, f64::from(cell_m) / longest);
         // Thinner than a millionth of its box: rounding, no tissue.
         if volume_m3 <= 1e-6 * longest.powi(3) {
             return Err(LatticeError::NoVolume);
@@ -249,14 +249,16 @@ fn smallest_cell_m(surface: &SurfaceMesh) -> f64 {
 /// Volume inside the surface [m³].
 ///
 /// The divergence theorem is exact for a closed surface without overlaps; where the columns of the
-/// inside test see another volume the surface is neither, and they are the better answer. Columns
-/// are a quarter of a cell wide, `cell_share` of the longest extent, and no better than that.
-fn enclosed_volume_m3(surface: &SurfaceMesh, columns_m3: f64, cell_share: f64) -> f64 {
+/// inside test see another volume along every axis the surface is neither, and they are the better
+/// answer. Columns are a quarter of a cell wide, `cell_share` of the longest extent, and no better than
+/// that; along a sheet that is thinner they see nothing, but through it they do.
+fn enclosed_volume_m3(surface: &SurfaceMesh, columns_m3: [f64; 3], cell_share: f64) -> f64 {
     let exact = surface.volume_m3().abs();
-    if (columns_m3 - exact).abs() < (0.02 + 0.2 * cell_share) * exact {
+    let agrees = |seen_m3: f64| (seen_m3 - exact).abs() < (0.02 + 0.2 * cell_share) * exact;
+    if columns_m3.into_iter().any(agrees) {
         exact
     } else {
-        columns_m3
+        columns_m3[1]
     }
 }
 

@@ -53,6 +53,8 @@ impl Desk {
         let display = format!(":{number}");
         let server = Command::new("Xvfb")
             .args([&display, "-screen", "0", "1280x800x24", "-nolisten", "tcp"])
+            // Else it begins anew when the last program leaves it, and takes a window that just comes with it.
+            .arg("-noreset")
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
@@ -122,8 +124,12 @@ impl Desk {
             .stdout(Stdio::null())
             .spawn()
             .expect("the window starts");
-        let window = Guard(window);
-        self.wait_for("the window", || self.id().is_some());
+        let mut window = Guard(window);
+        self.wait_for("the window", || {
+            let ended = window.0.try_wait().expect("it can be asked");
+            assert!(ended.is_none(), "the window ended: {ended:?}");
+            self.id().is_some()
+        });
         self.tool(&["windowfocus", "--sync", &self.id().expect("it is there")]);
         window
     }

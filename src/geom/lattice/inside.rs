@@ -97,8 +97,8 @@ impl Grid {
 pub(super) struct Inside {
     /// Sample points inside, a bit each, `x + 4y + 16z`; one mask a cube.
     pub(super) samples: Vec<u64>,
-    /// Volume inside [m³]: the middle one of three column integrals.
-    pub(super) volume_m3: f64,
+    /// Volume inside [m³]: three column integrals, the smallest first.
+    pub(super) volumes_m3: [f64; 3],
 }
 
 impl Inside {
@@ -121,11 +121,11 @@ impl Inside {
         let samples = (0..grid.cubes())
             .map(|i| (a.0[i] & b.0[i]) | (b.0[i] & c.0[i]) | (a.0[i] & c.0[i]))
             .collect();
-        let mut volumes = [a.1, b.1, c.1];
-        volumes.sort_by(f64::total_cmp);
+        let mut volumes_m3 = [a.1, b.1, c.1];
+        volumes_m3.sort_by(f64::total_cmp);
         Self {
             samples,
-            volume_m3: volumes[1],
+            volumes_m3,
         }
     }
 
