@@ -103,6 +103,9 @@ impl Session {
         let tools = self.tools_now();
         let start = Instant::now();
         let report = self.simulation.step(&tools);
+        if self.simulation.sags() {
+            hand_over_if_stiff(&mut self.simulation);
+        }
         Tick {
             report,
             sim_ms: start.elapsed().as_secs_f32() * 1e3,

@@ -351,6 +351,11 @@ impl Simulation {
         }
     }
 
+    /// Whether the body was so shaken that its method carries less stress over since, and lets it sag.
+    pub fn sags(&self) -> bool {
+        matches!(&self.model, Model::NeoHookean(model) if model.sags())
+    }
+
     /// Volume of the shapes that the tetrahedra want now [m³].
     fn rest_volume_now_m3(&self) -> f64 {
         self.rest_volume_m3 - self.beating.as_ref().map_or(0.0, Beating::lost_m3)

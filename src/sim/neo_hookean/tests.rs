@@ -314,3 +314,22 @@ fn a_body_says_how_many_substeps_it_takes_to_carry_all_its_stress() {
     };
     assert!(model.faithful_substeps(&places, &half).is_some());
 }
+
+#[test]
+fn a_body_with_some_light_tetrahedra_says_so_though_the_others_are_soft() {
+    let (mesh, places) = eight(&[0.0; 96]);
+    let model = model(&mesh);
+    let stiffest = (model.stiffnesses(&places, &PARAMS).into_iter()).fold(0.0, f64::max);
+    let of_limits = |share: f64| {
+        let scale = share * f64::from(CARRIED_STIFFNESS_MAX[1]) / stiffest;
+        // Particles of the last tetrahedron, of which every other is softer.
+        let mut places = places.clone();
+        for place in &mut places[28..32] {
+            place.w *= scale as f32;
+        }
+        model.faithful_substeps(&places, &PARAMS)
+    };
+    // 40 for one and at most its share of `stiffest` for seven is less than 12 in the mean.
+    assert_eq!(of_limits(0.9), None);
+    assert_eq!(of_limits(1.1).map(|substeps| substeps > 1), Some(true));
+}
