@@ -1,7 +1,7 @@
 //! `palpate validate` from outside: reference scenes are rendered, scored and held to their goals, and a folder with a
 //! fault is refused by name.
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::DVec3;
 use palpate::app::{ReferenceScene, read_full_reference};
 use palpate::optics::Layer;
 use palpate::reference::{Rays, WalkTissue, walked};
@@ -76,19 +76,13 @@ fn walks_against(dir: &Path, name: &str, sign: f64) -> (f64, f64) {
     let file = dir.join("scenes").join(format!("{name}.json"));
     let scene = ReferenceScene::read(dir, &file, &[]).expect("a scene");
     let (reference, noise) = read_full_reference(&scene).unwrap().expect("all orders");
-    let corners = |t: &[u32; 3]| t.map(|vertex| scene.mesh.point_of[vertex as usize]);
-    let triangles: Vec<[u32; 3]> = scene.mesh.triangles.iter().map(corners).collect();
     let points: Vec<DVec3> = scene.mesh.points.iter().map(|p| p.as_dvec3()).collect();
-    let rays = Rays::new(&points, &triangles);
-    let [width, height] = scene.size;
-    let world_from_clip = scene.view.clip_from_world(1.0).inverse();
+    let rays = Rays::new(&points, &scene.mesh.point_triangles());
     let eye = scene.view.eye.as_dvec3();
     let mut lines = Vec::new();
     // Every 11th pixel, off the edge of the ball.
-    for i in (0..(width * height) as usize).step_by(11) {
-        let at = Vec2::new((i % width as usize) as f32, (i / width as usize) as f32) + 0.5;
-        let ndc = at / Vec2::new(width as f32, height as f32) * 2.0 - 1.0;
-        let far = world_from_clip.project_point3(Vec3::new(ndc.x, -ndc.y, 0.5));
+    let pixels = scene.view.behind_pixels(scene.size);
+    for (i, far) in pixels.into_iter().enumerate().step_by(11) {
         let along = (far.as_dvec3() - eye).normalize();
         let inner = [i, i + 2, i.saturating_sub(2)]
             .iter()

@@ -6,7 +6,7 @@ use crate::optics::multiple::{Leak, reflectance};
 use crate::scene::{
     INNER_MAX, InnerSection, LIGHTS_MAX, PlacedLight, RestBox, Scene, SurfaceSection,
 };
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec2, Vec3};
 
 /// The march ends where the clearest layer has left exp(-8) of the light.
 const OPTICAL_DEPTH_MAX: f32 = 8.0;
@@ -51,6 +51,19 @@ impl View {
     /// World to clip space.
     pub fn clip_from_world(&self, aspect: f32) -> Mat4 {
         self.clip_from_view(aspect) * self.view_from_world()
+    }
+
+    /// What lies behind the middle of each pixel of a picture of that width and height [px]: a place on the line from the
+    /// eye through it [m], row by row from the top.
+    pub fn behind_pixels(&self, [width, height]: [u32; 2]) -> Vec<Vec3> {
+        let world_from_clip = self.clip_from_world(width as f32 / height as f32).inverse();
+        (0..width * height)
+            .map(|i| {
+                let at = Vec2::new((i % width) as f32, (i / width) as f32) + 0.5;
+                let ndc = at / Vec2::new(width as f32, height as f32) * 2.0 - 1.0;
+                world_from_clip.project_point3(Vec3::new(ndc.x, -ndc.y, 0.5))
+            })
+            .collect()
     }
 }
 

@@ -230,9 +230,11 @@ impl NeoHookean {
         let mean = stiffnesses.iter().sum::<f64>() as f32 / count;
         let all_but_few = stiffnesses.get((SHED_SHARE_MAX * count) as usize);
         let all_but_few = all_but_few.map_or(0.0, |&stiffness| stiffness as f32);
-        let sweeps = params.iterations as f32;
-        let own_max = CARRIED_STIFFNESS_MAX[1] * sweeps;
-        let wanted = (mean / (CARRIED_STIFFNESS_SAFE * sweeps)).max(all_but_few / own_max);
+        let (own_max, safe) = (
+            own_max(params),
+            CARRIED_STIFFNESS_SAFE * params.iterations as f32,
+        );
+        let wanted = (mean / safe).max(all_but_few / own_max);
         let wanted = f64::from(params.substeps) * f64::from(wanted).sqrt();
         (mean > self.mean_max(params) || all_but_few > own_max)
             .then(|| wanted.ceil().min(f64::from(u32::MAX)) as u32)
@@ -347,7 +349,7 @@ impl NeoHookean {
             // Another material or time step: what was seen of the old one says nothing.
             self.carry = Carry::Most;
         }
-        let own_max = CARRIED_STIFFNESS_MAX[1] * params.iterations as f32;
+        let own_max = own_max(params);
         let mean_max = self.mean_max(params);
         let mut stiffness_sum = 0.0;
         for batch in self.tets.as_mut_slice() {
@@ -384,6 +386,11 @@ impl NeoHookean {
                 }
             });
     }
+}
+
+/// The largest κ at which a tetrahedron carries all its stress over.
+fn own_max(params: &SolverParams) -> f32 {
+    CARRIED_STIFFNESS_MAX[1] * params.iterations as f32
 }
 
 /// κ of a tetrahedron of this mobility S, with k = h² V; 0 where a lane is not used.

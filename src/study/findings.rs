@@ -2,6 +2,7 @@
 
 use crate::measure::chart::three_digits;
 use crate::measure::page::{Block, Section};
+use crate::measure::scatter::{ScatterChart, sheet};
 
 /// What the rows of a study say.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,6 +34,19 @@ impl Findings {
             blocks: self.blocks,
         }
     }
+}
+
+/// The chart of each of `scenes`: all in one picture, in two columns, and as a block with their names.
+pub fn scene_charts(scenes: &[&str], chart: impl Fn(&str) -> ScatterChart) -> (String, Block) {
+    let drawn: Vec<ScatterChart> = scenes.iter().map(|scene| chart(scene)).collect();
+    let size_px = drawn.first().map_or((0.0, 0.0), |chart| chart.size_px);
+    let charts: Vec<String> = drawn.iter().map(ScatterChart::svg).collect();
+    let svg = sheet(&charts, size_px, 2);
+    let captions = scenes.iter().map(|scene| (*scene).to_owned());
+    (
+        svg,
+        Block::Charts(charts.into_iter().zip(captions).collect()),
+    )
 }
 
 /// A number of a table to three digits; a dash where nothing was measured.

@@ -4,7 +4,7 @@
 //! reference scenes are at hand. All are drawn by the passes of a frame.
 
 use super::Study;
-use super::findings::{Findings, told};
+use super::findings::{Findings, scene_charts, told};
 use super::sweep::{Cost, Row, Sweep, Verdict, finite};
 use crate::app::{AppError, ReferenceScene, Still, folder_scenes, load_scene, read_reference};
 use crate::geom::SurfaceMesh;
@@ -16,7 +16,7 @@ use crate::gpu::Gpu;
 use crate::measure::chart::three_digits;
 use crate::measure::page::{Block, Table};
 use crate::measure::radiance::eroded;
-use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
+use crate::measure::scatter::{Cloud, Point, ScatterChart};
 use crate::measure::stats::Stats;
 use crate::optics::closed_form::parallel_layers;
 use crate::passes::view::View;
@@ -309,24 +309,20 @@ impl Stage {
 
     /// Radiance of parallel layers below the plane z = 0 at the middle of each pixel.
     fn closed_form(&self, bottoms_m: &[f32]) -> Vec<f32> {
-        let world_from_clip = self.view.clip_from_world(1.0).inverse();
         let layers: Vec<_> = (self.scene.surface.layers.iter())
             .map(|&layer| layer.into())
             .collect();
         let light = &self.scene.lights[0];
         let to_light = light.toward.expect("the sheet's light is far").normalize();
-        let [width, height] = self.size;
-        let pixel = |i: u32| {
-            let at = Vec2::new((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
-            let ndc = at / Vec2::new(width as f32, height as f32) * 2.0 - 1.0;
-            let far = world_from_clip.project_point3(Vec3::new(ndc.x, -ndc.y, 0.5));
+        let pixel = |far: Vec3| {
             let to_eye = (self.view.eye - far).normalize();
             let between = to_light.dot(to_eye);
             (parallel_layers(&layers, bottoms_m, to_light.z, to_eye.z, between)
                 * Vec3::from(light.irradiance_w_m2))
             .to_array()
         };
-        (0..width * height).flat_map(pixel).collect()
+        let pixels = self.view.behind_pixels(self.size);
+        pixels.into_iter().flat_map(pixel).collect()
     }
 }
 
@@ -544,11 +540,7 @@ fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
     };
     let mut scenes: Vec<&str> = rows.iter().map(|row| row.cell.scene.as_str()).collect();
     scenes.dedup();
-    let charts: Vec<String> = scenes
-        .iter()
-        .map(|scene| chart(rows, scene).svg())
-        .collect();
-    let captions = scenes.iter().map(|scene| (*scene).to_owned());
+    let (svg, charts) = scene_charts(&scenes, |scene| chart(rows, scene));
     let mut blocks = vec![
         Block::Paragraph(
             "Radiance of light scattered once against what is exact, over the GPU time of the pass that gathers it. \
@@ -557,17 +549,14 @@ fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
              stand on its edge."
                 .to_owned(),
         ),
-        Block::Charts(charts.iter().cloned().zip(captions).collect()),
+        charts,
     ];
     blocks.extend(comparison(rows, &scenes).map(Block::Paragraph));
     blocks.push(Block::Table(Table {
         head: head.map(str::to_owned).to_vec(),
         rows: rows.iter().map(line).collect(),
     }));
-    Findings {
-        svg: sheet(&charts, CHART_PX, 2),
-        blocks,
-    }
+    Findings { svg, blocks }
 }
 
 /// Ten evaluations of ours against a hundred of the papers'.

@@ -5,7 +5,7 @@
 //! smallest. There is neither room light nor film.
 
 use super::Study;
-use super::findings::{Findings, told};
+use super::findings::{Findings, scene_charts, told};
 use super::sweep::{Cost, Row, Sweep, Verdict, finite};
 use crate::app::{AppError, ReferenceScene, Still, folder_scenes, load_scene, read_full_reference};
 use crate::geom::SurfaceMesh;
@@ -16,7 +16,7 @@ use crate::geom::unwrap::unwrap;
 use crate::gpu::Gpu;
 use crate::measure::page::{Block, Table};
 use crate::measure::radiance::eroded;
-use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
+use crate::measure::scatter::{Cloud, Point, ScatterChart};
 use crate::measure::stats::Stats;
 use crate::optics::diffusion::mean_distance_m;
 use crate::optics::multiple::reflectance;
@@ -27,7 +27,7 @@ use crate::passes::tangents::Tangents;
 use crate::passes::view::View;
 use crate::reference::{HalfLine, Rays, WalkTissue, walked};
 use crate::scene::{LightSection, Multiple, Quadrature, Scene, SurfaceKind};
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 use image::{DynamicImage, Rgba, RgbaImage};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -471,22 +471,16 @@ fn ball(plan: &BallPlan, side: LitFrom, method: Method) -> Result<Stage, AppErro
 fn walked_picture(stage: &Stage, plan: &BallPlan, threads: usize) -> Oracle {
     eprintln!("walking {} times a pixel and colour", plan.walks);
     let mesh = &stage.mesh;
-    let corners = |t: &[u32; 3]| t.map(|vertex| mesh.point_of[vertex as usize]);
-    let triangles: Vec<[u32; 3]> = mesh.triangles.iter().map(corners).collect();
     let points: Vec<DVec3> = mesh.points.iter().map(|p| p.as_dvec3()).collect();
-    let rays = Rays::new(&points, &triangles);
+    let rays = Rays::new(&points, &mesh.point_triangles());
     let eye = stage.view.eye.as_dvec3();
-    let world_from_clip = stage.view.clip_from_world(1.0).inverse();
-    let [width, height] = stage.size;
-    let entry = |i: u32| -> Option<HalfLine> {
-        let at = Vec2::new((i % width) as f32 + 0.5, (i / width) as f32 + 0.5);
-        let ndc = at / Vec2::new(width as f32, height as f32) * 2.0 - 1.0;
-        let far = world_from_clip.project_point3(Vec3::new(ndc.x, -ndc.y, 0.5));
+    let entry = |far: Vec3| -> Option<HalfLine> {
         let along = (far.as_dvec3() - eye).normalize();
         let (distance, _) = rays.first((eye, along))?;
         Some((eye + distance * along, along))
     };
-    let entries: Vec<Option<HalfLine>> = (0..width * height).map(entry).collect();
+    let pixels = stage.view.behind_pixels(stage.size);
+    let entries: Vec<Option<HalfLine>> = pixels.into_iter().map(entry).collect();
     let covered: Vec<bool> = entries.iter().map(Option::is_some).collect();
     let lines: Vec<HalfLine> = entries.iter().flatten().copied().collect();
     let light = &stage.scene.lights[0];
@@ -496,7 +490,7 @@ fn walked_picture(stage: &Stage, plan: &BallPlan, threads: usize) -> Oracle {
         .as_dvec3()
         .normalize();
     let layer = Layer::from(stage.scene.surface.layers[0]);
-    let pixels = (width * height) as usize;
+    let pixels = entries.len();
     let (mut rgb, mut error) = (vec![0.0; 3 * pixels], vec![0.0; 3 * pixels]);
     for channel in 0..3 {
         let tissue = WalkTissue {
@@ -596,13 +590,9 @@ fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
     };
     let mut scenes: Vec<&str> = rows.iter().map(|row| row.cell.scene.as_str()).collect();
     scenes.dedup();
-    let charts: Vec<String> = scenes
-        .iter()
-        .map(|scene| chart(rows, scene).svg())
-        .collect();
-    let captions = scenes.iter().map(|scene| (*scene).to_owned());
+    let (svg, charts) = scene_charts(&scenes, |scene| chart(rows, scene));
     Findings {
-        svg: sheet(&charts, CHART_PX, 2),
+        svg,
         blocks: vec![
             Block::Paragraph(
                 "Every surface against light of all orders, over the GPU time of what it draws at 800 × 600 beyond tangents \
@@ -610,7 +600,7 @@ fn findings(rows: &[Row<Cell, Measures>]) -> Findings {
                  stand in the table."
                     .to_owned(),
             ),
-            Block::Charts(charts.iter().cloned().zip(captions).collect()),
+            charts,
             Block::Table(Table {
                 head: head.map(str::to_owned).to_vec(),
                 rows: rows.iter().map(line).collect(),
