@@ -99,7 +99,8 @@ fn swing_of_beam_1k(frames: usize, damping_per_s: f64) -> Option<Vec<f64>> {
     let mut tips = vec![0.0];
     fem.swing(fem.at_rest(), &swing, |_, state| {
         tips.push(peer.tip_m(&state.positions).z);
-    });
+    })
+    .expect("every step has a solution");
     let last = tips.len() - 1;
     println!("frame {last}: tip {:.4} mm", 1e3 * tips[last]);
     Some(tips)

@@ -5,6 +5,7 @@ use super::{
     newton::{Inertia, Potential},
 };
 use glam::DVec3;
+use std::fmt;
 
 /// Forces left at a midpoint, over all there are: far less than what a step gets wrong.
 const TOLERANCE: f64 = 1e-9;
@@ -29,6 +30,27 @@ pub struct Swing {
     pub damping_per_s: f64,
 }
 
+/// Newton's method found no end of a midpoint step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoStep {
+    /// Length of the step [s].
+    pub step_s: f64,
+    /// Norm of the forces left on free particles [N].
+    pub residual_n: f64,
+}
+
+impl fmt::Display for NoStep {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "a midpoint step of {:.1e} s was not solved: {:.1e} N are left; use a stiffer material or more steps a frame",
+            self.step_s, self.residual_n
+        )
+    }
+}
+
+impl std::error::Error for NoStep {}
+
 impl Fem {
     /// The body at rest, as it is before any load.
     pub fn at_rest(&self) -> State {
@@ -49,21 +71,27 @@ impl Fem {
     /// Lets the body move from `state` and calls `seen` with the state at the end of each frame,
     /// counted from 1.
     ///
-    /// # Panics
+    /// # Errors
     ///
-    /// If a step has no solution: it is far too long for this body.
-    pub fn swing(&self, mut state: State, swing: &Swing, mut seen: impl FnMut(usize, &State)) {
+    /// [`NoStep`] if a step has no solution: it is far too long for this body.
+    pub fn swing(
+        &self,
+        mut state: State,
+        swing: &Swing,
+        mut seen: impl FnMut(usize, &State),
+    ) -> Result<(), NoStep> {
         let step_s = swing.frame_s / swing.steps_per_frame as f64;
         let damping = (-swing.damping_per_s * swing.frame_s).exp();
         for frame in 1..=swing.frames {
             for _ in 0..swing.steps_per_frame {
-                self.midpoint_step(&mut state, step_s);
+                self.midpoint_step(&mut state, step_s)?;
             }
             for velocity in &mut state.velocities {
                 *velocity *= damping;
             }
             seen(frame, &state);
         }
+        Ok(())
     }
 
     /// One step of the implicit midpoint rule.
@@ -71,10 +99,10 @@ impl Fem {
     /// The midpoint y is where (4/h²) M (y − x − h/2 v) = force(y), the minimum of a potential; the
     /// step ends at 2y − x with the velocity 2 (2y − 2x)/h − v.
     ///
-    /// # Panics
+    /// # Errors
     ///
-    /// If the step has no solution: it is far too long for this body.
-    pub fn midpoint_step(&self, state: &mut State, step_s: f64) {
+    /// [`NoStep`] if the step has no solution: it is far too long for this body. The state is as before it.
+    pub fn midpoint_step(&self, state: &mut State, step_s: f64) -> Result<(), NoStep> {
         let predicted: Vec<DVec3> = (state.positions.iter().zip(&state.velocities))
             .map(|(x, v)| *x + 0.5 * step_s * *v)
             .collect();
@@ -94,11 +122,10 @@ impl Fem {
             .sum();
         let tolerance_n = TOLERANCE * forces + self.rounding_n(&midpoint);
         let ended = potential.minimise(&mut midpoint, tolerance_n);
-        assert!(
-            ended.residual_n <= 1e2 * tolerance_n,
-            "a midpoint step of {step_s} s is solved, not left at {} N",
-            ended.residual_n
-        );
+        if ended.residual_n.is_nan() || ended.residual_n > 1e2 * tolerance_n {
+            let residual_n = ended.residual_n;
+            return Err(NoStep { step_s, residual_n });
+        }
         for (i, y) in midpoint.into_iter().enumerate() {
             let moved = 2.0 * (y - state.positions[i]);
             state.positions[i] += moved;
@@ -108,5 +135,6 @@ impl Fem {
                 2.0 / step_s * moved - state.velocities[i]
             };
         }
+        Ok(())
     }
 }

@@ -22,7 +22,7 @@ mod sparse;
 mod statics;
 mod walk;
 
-pub use dynamics::{State, Swing};
+pub use dynamics::{NoStep, State, Swing};
 pub use fem::{Fem, FemSetup};
 pub use glow::EvenTissue;
 pub use material::Material;

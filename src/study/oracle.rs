@@ -42,7 +42,7 @@ impl Oracle {
     ///
     /// # Errors
     ///
-    /// [`AppError::Body`] if the body has no equilibrium; [`AppError::File`] if the file can't be
+    /// [`AppError::Body`] if the body has no equilibrium, or a step of its motion no solution; [`AppError::File`] if the file can't be
     /// written.
     pub fn kept(
         file: &Path,
@@ -74,7 +74,8 @@ impl Oracle {
             };
             fem.swing(start, &swing, |_, state| {
                 swing_m.push(height(&state.positions))
-            });
+            })
+            .map_err(|error| AppError::Body(error.to_string()))?;
         }
         let oracle = Self {
             inputs_sha256,

@@ -34,9 +34,11 @@ fn mode_samples(solver: Solver, setup: &BodySetup, tissue: Tissue) -> Vec<f64> {
                 velocities: vec![DVec3::ZERO; start.len()],
                 positions: start,
             };
-            fem(setup, tissue.material()).swing(start, &swing, |_, state| {
-                samples.push(amplitude(&state.positions));
-            });
+            fem(setup, tissue.material())
+                .swing(start, &swing, |_, state| {
+                    samples.push(amplitude(&state.positions));
+                })
+                .expect("every step has a solution");
         }
         Solver::Method(method) => {
             // Substeps as long as the default ones.

@@ -253,7 +253,7 @@ impl Sweep for Solver {
 
     fn measure(&self, cell: &Cell) -> Result<Row<Cell, Measures>, AppError> {
         let body = shared(&self.bodies, cell.mesh.clone(), || self.body(cell))?;
-        let tissue = format!("{}-{:.0}pa", cell.mesh, cell.youngs_modulus_pa);
+        let tissue = format!("{}-{}pa", cell.mesh, cell.youngs_modulus_pa);
         let oracle = shared(&self.oracles, tissue.clone(), || {
             let file = self.out.join(format!("oracle-{tissue}.json"));
             let motion = cell.motion(body.setup.tets.tets.len());
