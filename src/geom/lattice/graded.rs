@@ -17,6 +17,9 @@ use std::collections::HashMap;
 
 /// Radius of the region of finest cells round the middle of the top face, as a share of the height.
 const CORE_SHARE: f64 = 0.028;
+/// Radius of that region in finest cells, at least: with less the tetrahedra at its middle would be judged
+/// by where they reach, and none halved.
+const CORE_CELLS_MIN: f64 = 2.5;
 /// So many times the finest cell is added for each radius of that region further out.
 const GROWTH: f64 = 2.4;
 /// More tetrahedra than this are refused: the ratio of the largest cell to the finest is limited
@@ -25,8 +28,8 @@ const GRADED_TETS_MAX: usize = 250_000;
 
 /// A box of `size_m` below the origin, which is the middle of its top face (y = max), of tissue of
 /// `density_kg_m3`, with its own skin as surface. No edge is longer than `cell_m` near the origin;
-/// further away than a fiftieth of the height, edges may grow with the distance. Half the cell makes
-/// all edges half as long.
+/// further away than a fortieth of the height, or two and a half cells where that is more, edges may grow with the
+/// distance. Half the cell makes all edges half as long, once it is below a ninetieth of the height.
 ///
 /// Numbers are the finer the nearer they are to 0, as the cells are: rounding to f32 is the same
 /// share of every cell.
@@ -45,12 +48,13 @@ pub fn graded_block(
     if !(density_kg_m3.is_finite() && density_kg_m3 > 0.0) {
         return Err(LatticeError::DensityOutOfRange { density_kg_m3 });
     }
-    let core_m = CORE_SHARE * f64::from(size_m.y);
+    let core_of_box_m = CORE_SHARE * f64::from(size_m.y);
+    let core_m = core_of_box_m.max(CORE_CELLS_MIN * f64::from(cell_m));
     let out_of_range = || LatticeError::CellOutOfRange {
         cell_m,
         // Counted: 600 (core / cell)³ tetrahedra where the box is twice as wide as high, and more
         // for each octave that it is wider.
-        min_m: (core_m * (2000.0 / GRADED_TETS_MAX as f64).cbrt()) as f32,
+        min_m: (core_of_box_m * (2000.0 / GRADED_TETS_MAX as f64).cbrt()) as f32,
         max_m: size_m.y,
     };
     if !(cell_m > 0.0 && cell_m <= size_m.y) {
@@ -288,6 +292,22 @@ mod tests {
         assert!(farthest > 20.0 * cell_m, "{farthest}");
         let count = lattice.tets.tets.len();
         assert!((4_000..10_000).contains(&count), "{count} tetrahedra");
+    }
+
+    #[test]
+    fn coarse_cells_are_as_fine_at_the_middle_as_they_are_said_to_be() {
+        for cell_m in [0.003, 0.01, 0.03, 0.1] {
+            let (_, lattice) = graded_block(SIZE, cell_m, 1000.0).expect("it can be made");
+            let mesh = &lattice.tets;
+            let longest = (0..mesh.tets.len())
+                .map(|tet| corners(mesh, tet))
+                .filter(|places| places.contains(&DVec3::ZERO))
+                .flat_map(|places| edges().map(move |[a, b]| places[a].distance(places[b])))
+                .fold(0.0, f64::max);
+            assert!(longest <= f64::from(cell_m), "{longest} of {cell_m}");
+            assert!(longest > 0.4 * f64::from(cell_m), "{longest} of {cell_m}");
+            assert!(quality(mesh).worst > 0.6, "{:?}", quality(mesh));
+        }
     }
 
     #[test]
