@@ -380,6 +380,8 @@ fn a_body_that_was_struck_so_hard_that_waves_grew_is_handed_over_and_sags_no_mor
     let (tip, struck) = settled_of(&format!("{BEAM}{BLOW}"), &sets);
     assert_eq!(struck.scene.solver.method, Method::XpbdNeoHookean);
     assert_eq!(struck.solver().method, Method::Implicit);
+    let told = (struck.notes.iter()).filter(|note| note.contains("waves grew"));
+    assert_eq!(told.count(), 1, "{:?}", struck.notes);
     let (truth, calm) = settled(&sets);
     assert_eq!(calm.solver().method, Method::XpbdNeoHookean);
     // Left as it was, it hung 0.9 % lower; half a percent is what is asked of a settled tip.

@@ -202,7 +202,7 @@ impl Recording {
             pictures: thinned(std::mem::take(&mut self.pictures)),
         })
         .write(&out.join("report.html"))?;
-        self.say(&summary, out);
+        self.say(&summary, session.solver().method, out);
         self.say_unsettled(session);
         Ok(())
     }
@@ -282,7 +282,7 @@ impl Recording {
     }
 
     /// One line for the one who waited.
-    fn say(&self, summary: &Summary, out: &Path) {
+    fn say(&self, summary: &Summary, method: Method, out: &Path) {
         if let Some(frame) = &summary.frame_ms {
             eprintln!(
                 "{} frames, p50 {:.1} ms, p95 {:.1} ms, largest force {} N; see {}",
@@ -294,11 +294,14 @@ impl Recording {
             );
         }
         if summary.inverted_tets.last > 0 {
-            eprintln!(
-                "{} tetrahedra end inverted, so the body is wrecked: use more substeps, a stiffer \
-                 material, or the method implicit",
-                summary.inverted_tets.last
-            );
+            let remedy = match method {
+                Method::Implicit => {
+                    "the load folds it: use a stiffer material, or a finer mesh where it is held"
+                }
+                _ => "use more substeps, a stiffer material, or the method implicit",
+            };
+            let count = summary.inverted_tets.last;
+            eprintln!("{count} tetrahedra end inverted, so the body is wrecked: {remedy}");
         }
         if self.frozen > 0 {
             eprintln!(

@@ -178,7 +178,11 @@ impl Run {
         self.rest_frame(options)?;
         for frame in 1..=output.frames {
             let start = Instant::now();
+            let told = self.session.notes.len();
             let tick = self.session.tick();
+            for note in &self.session.notes[told..] {
+                bar.suspend(|| eprintln!("{}: {note}", options.scene));
+            }
             let drawn = self.draw()?;
             self.recording.add(&self.session, start, &tick, drawn);
             let is_last = frame == output.frames;

@@ -103,13 +103,30 @@ impl Session {
         let tools = self.tools_now();
         let start = Instant::now();
         let report = self.simulation.step(&tools);
-        if self.simulation.sags() {
-            hand_over_if_stiff(&mut self.simulation);
+        if self.simulation.sags() && hand_over_if_stiff(&mut self.simulation) {
+            self.note_hand_over();
         }
         Tick {
             report,
             sim_ms: start.elapsed().as_secs_f32() * 1e3,
             tools,
+        }
+    }
+
+    /// Says once that waves grew in the body, and what is done from here on.
+    fn note_hand_over(&mut self) {
+        let taken = self.solver();
+        let note = format!(
+            "in frame {} waves grew in the tissue, which is too stiff for {} in {}: from there on {} is taken, in {}",
+            self.frame,
+            self.scene.solver.method.name(),
+            substeps(self.scene.solver.substeps),
+            taken.method.name(),
+            substeps(taken.substeps),
+        );
+        // The same run after a reset says the same.
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
         }
     }
 
@@ -235,9 +252,11 @@ impl Session {
 const HANDED_SUBSTEPS_MAX: u32 = 4;
 
 /// Hands a body to `implicit` where `xpbd-neo-hookean` would need more substeps than it has to be as stiff as it is
-/// said to be. More substeps would do as well, but cost more, and slivers tremble with some numbers of them.
-fn hand_over_if_stiff(simulation: &mut Simulation) {
-    if simulation.faithful_substeps().is_some() {
+/// said to be, and says whether it did. More substeps would do as well, but cost more, and slivers tremble with some
+/// numbers of them.
+fn hand_over_if_stiff(simulation: &mut Simulation) -> bool {
+    let stiff = simulation.faithful_substeps().is_some();
+    if stiff {
         let asked = simulation.params();
         simulation.set_params(SolverParams {
             method: Method::Implicit,
@@ -245,6 +264,13 @@ fn hand_over_if_stiff(simulation: &mut Simulation) {
             ..asked
         });
     }
+    stiff
+}
+
+/// "1 substep", "4 substeps".
+pub fn substeps(count: u32) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} substep{plural}")
 }
 
 /// What a user should know before trusting the solver with this body.
@@ -266,13 +292,13 @@ fn solver_notes(scene: &Scene, simulation: &Simulation) -> Vec<String> {
     let (asked, taken) = (scene.solver, simulation.params());
     if taken.method != asked.method {
         notes.push(format!(
-            "tissue of {:.0} Pa is too stiff for {} in {} substeps on this mesh, and would sag too far: \
+            "tissue of {:.0} Pa is too stiff for {} in {} on this mesh, and would sag too far: \
              {} is taken, in {}",
             asked.youngs_modulus_pa,
             asked.method.name(),
-            asked.substeps,
+            substeps(asked.substeps),
             taken.method.name(),
-            taken.substeps,
+            substeps(taken.substeps),
         ));
     }
     let setup = simulation.setup();

@@ -5,6 +5,7 @@ use crate::app::Session;
 use crate::app::hand::HandKnobs;
 use crate::app::light_error::ErrorMap;
 use crate::app::orbit::Side;
+use crate::app::session::substeps;
 use crate::app::slider::{Slider, three};
 use crate::geom::plane::LightPathMethod;
 use crate::passes::frame::{patch_radius_m, tolerance_m};
@@ -172,7 +173,7 @@ pub fn solver(ui: &mut Ui, session: &mut Session) {
     ui.add(Slider::new(&mut solver.poisson_ratio, 0.0..=0.49).text("Poisson ratio"));
     ui.add(Slider::new(&mut solver.substeps, 1..=60).text("substeps"));
     if taken.method != solver.method {
-        let (method, substeps) = (taken.method.name(), taken.substeps);
+        let (method, substeps) = (taken.method.name(), substeps(taken.substeps));
         ui.label(format!(
             "{method} is taken, in {substeps}: the tissue is stiff"
         ));
