@@ -33,7 +33,7 @@ override FOLLOWS_VOLUME: u32 = 0u;
 const THICKNESS_MIN: f32 = 0.25;
 const THICKNESS_MAX: f32 = 4.0;
 
-// What `primitives` holds: 0 nothing, the tangent plane is meant; 1 planes; 2 quadrics.
+// What `primitives` holds: 0 nothing, the tangent plane is meant; 1 planes; 2 quadrics; 3 nothing, none is written.
 override PRIMITIVE: u32 = 0u;
 
 struct Varyings {
@@ -82,7 +82,7 @@ fn geometry_vertex(
 ) -> Varyings {
     let normal = normals[point].xyz;
     let bitangent = tangent.w * cross(normal, tangent.xyz);
-    var primitive = vec4f(normal, 0.0);
+    var primitive = select(vec4f(normal, 0.0), vec4f(0.0), PRIMITIVE == 3u);
     if PRIMITIVE == 1u {
         primitive = primitives[point];
     }
@@ -138,11 +138,14 @@ fn base_fragment(in: Varyings) -> @location(0) vec4u {
 @fragment
 fn detail_fragment(in: Varyings) -> Packed {
     let gradients = clamp(in.gradients, vec4f(-65504.0), vec4f(65504.0));
-    let offset_mm = clamp(1e3 * in.primitive.w, -65504.0, 65504.0);
-    var words = vec2u(
-        octahedral(in.primitive.xyz),
-        pack2x16float(vec2f(offset_mm, in.thickness)),
-    );
+    var words = vec2u(0u, pack2x16float(vec2f(0.0, in.thickness)));
+    if PRIMITIVE < 2u {
+        let offset_mm = clamp(1e3 * in.primitive.w, -65504.0, 65504.0);
+        words = vec2u(
+            octahedral(in.primitive.xyz),
+            pack2x16float(vec2f(offset_mm, in.thickness)),
+        );
+    }
     if PRIMITIVE == 2u {
         words = vec2u(
             pack2x16float(in.primitive.xy),

@@ -188,11 +188,20 @@ fn gooey(ui: &mut Ui, surface: &mut SurfaceSection) {
             .text("blur radius [m]"),
     );
     ui.add(Slider::new(&mut surface.blur_passes, 0..=6).text("blur passes"));
-    ui.add(
-        Slider::new(&mut surface.light_map_size_px, 64..=1024)
-            .logarithmic(true)
-            .text("light map [px]"),
-    );
+    let mut by_blur = surface.light_map_size_px.is_none();
+    if ui
+        .checkbox(&mut by_blur, "light map as fine as the blur asks")
+        .changed()
+    {
+        surface.light_map_size_px = (!by_blur).then_some(256);
+    }
+    if let Some(size_px) = &mut surface.light_map_size_px {
+        ui.add(
+            Slider::new(size_px, 64..=1024)
+                .logarithmic(true)
+                .text("light map [px]"),
+        );
+    }
     ui.add(Slider::new(&mut surface.outer_opacity, 0.0..=2.0).text("outer opacity"));
     ui.add(Slider::new(&mut surface.layer_shadow, 0.0..=1.0).text("shadow between layers"));
     let light = |light| match light {

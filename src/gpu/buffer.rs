@@ -52,12 +52,40 @@ pub fn uniform<T: Pod>(gpu: &Gpu, label: &str, content: &T) -> wgpu::Buffer {
 ///
 /// [`GpuError::ReadBack`] if the memory can't be mapped.
 pub fn read_buffer<T: Pod>(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
-    let staging = staging(gpu, buffer.size());
+    let back = ReadBack::new(gpu, buffer.size());
     let mut encoder = gpu.encoder();
-    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
+    back.copy(buffer, &mut encoder);
     gpu.queue.submit([encoder.finish()]);
-    let bytes = map(gpu, &staging)?;
-    Ok(bytemuck::pod_collect_to_vec(&bytes))
+    back.read(gpu)
+}
+
+/// A place where a buffer's content is kept for the CPU: the copy can be part of a frame, which need not be waited for
+/// twice then.
+pub struct ReadBack {
+    staging: wgpu::Buffer,
+}
+
+impl ReadBack {
+    /// Room for `size` bytes.
+    pub fn new(gpu: &Gpu, size: u64) -> Self {
+        Self {
+            staging: staging(gpu, size),
+        }
+    }
+
+    /// Adds the copy of all of `buffer` to `encoder`.
+    pub fn copy(&self, buffer: &wgpu::Buffer, encoder: &mut wgpu::CommandEncoder) {
+        encoder.copy_buffer_to_buffer(buffer, 0, &self.staging, 0, buffer.size());
+    }
+
+    /// What was copied last, waited for.
+    ///
+    /// # Errors
+    ///
+    /// [`GpuError::ReadBack`] if the memory can't be mapped.
+    pub fn read<T: Pod>(&self, gpu: &Gpu) -> Result<Vec<T>, GpuError> {
+        Ok(bytemuck::pod_collect_to_vec(&map(gpu, &self.staging)?))
+    }
 }
 
 /// Pixels of an 8-bit RGBA texture, row by row from the top, 4 bytes each.

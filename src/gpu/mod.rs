@@ -11,8 +11,8 @@ mod timer;
 
 pub use binding::{Binding, Kernel, bind, workgroups};
 pub use buffer::{
-    read_buffer, read_texture_depth, read_texture_rgba8, read_texture_rgba16f, read_texture_words,
-    storage, uniform,
+    ReadBack, read_buffer, read_texture_depth, read_texture_rgba8, read_texture_rgba16f,
+    read_texture_words, storage, uniform,
 };
 pub use error::GpuError;
 pub use shader::{Wgsl, compile, join};

@@ -1,6 +1,6 @@
 //! GPU time of every pass of a frame, by timestamp queries.
 
-use super::{Gpu, GpuError, read_buffer};
+use super::{Gpu, GpuError, ReadBack};
 
 /// Time of one pass in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +22,7 @@ pub struct Timer {
 struct Queries {
     set: wgpu::QuerySet,
     resolved: wgpu::Buffer,
+    back: ReadBack,
     capacity: u32,
     period_ns: f32,
 }
@@ -41,6 +42,7 @@ impl Timer {
                 usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
                 mapped_at_creation: false,
             }),
+            back: ReadBack::new(gpu, u64::from(2 * capacity) * 8),
             capacity,
             period_ns: gpu.timestamp_period_ns,
         });
@@ -102,6 +104,7 @@ impl Timer {
         {
             let count = 2 * self.names.len() as u32;
             encoder.resolve_query_set(&queries.set, 0..count, &queries.resolved, 0);
+            queries.back.copy(&queries.resolved, encoder);
         }
     }
 
@@ -117,7 +120,7 @@ impl Timer {
         if self.names.is_empty() {
             return Ok(Vec::new());
         }
-        let ticks: Vec<u64> = read_buffer(gpu, &queries.resolved)?;
+        let ticks: Vec<u64> = queries.back.read(gpu)?;
         let ms = |from: u64, to: u64| {
             // A software driver may stamp out of order by a tick; that is no negative time.
             to.saturating_sub(from) as f32 * queries.period_ns * 1e-6

@@ -4,11 +4,11 @@
 //! The entries of the first light are the shadow map of the light that casts shadows.
 
 use super::draw::{DepthUse, Draw, DrawKind, Target, cleared_depth};
-use super::mesh_buffers::MeshBuffers;
+use super::mesh_buffers::{MeshBuffers, PointTriangles};
 use super::shadow::SIZE_PX;
 use super::tangents::Tangents;
 use crate::geom::SurfaceMesh;
-use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, storage, uniform};
+use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, uniform};
 use glam::Mat4;
 
 /// Mirror of `BodyDepth` in `shaders/body_depth.wgsl`.
@@ -34,9 +34,7 @@ pub struct BodyDepths {
     layers: Vec<Layer>,
     /// Stands for maps that are not asked for; never read.
     none: Target,
-    /// Corners of the triangles as points: the maps need no texture coordinates.
-    indices: wgpu::Buffer,
-    index_count: u32,
+    triangles: PointTriangles,
 }
 
 impl BodyDepths {
@@ -130,13 +128,11 @@ impl BodyDepths {
                 target: Target::new(gpu, Self::NAME, size, super::DEPTH_FORMAT),
             });
         }
-        let indices = mesh.point_triangles();
         Ok(Self {
             uniforms,
             layers,
             none,
-            indices: storage(gpu, "body depth triangles", indices.as_flattened())?,
-            index_count: 3 * indices.len() as u32,
+            triangles: PointTriangles::new(gpu, mesh)?,
         })
     }
 
@@ -180,9 +176,7 @@ impl BodyDepths {
             for (k, draw) in layer.draws.iter().enumerate() {
                 pass.set_viewport(k as f32 * side, 0.0, side, side, 0.0, 1.0);
                 draw.set(&mut pass);
-                pass.set_vertex_buffer(0, mesh.positions.slice(..));
-                pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
-                pass.draw_indexed(0..self.index_count, 0, 0..1);
+                self.triangles.draw(&mesh.positions, &mut pass);
             }
         }
     }

@@ -4,12 +4,12 @@
 //! The first map is the shadow map of the light that casts shadows: a scene with both draws it once.
 
 use super::draw::{DepthUse, Draw, DrawKind, Target, cleared_depth, kept};
-use super::mesh_buffers::MeshBuffers;
+use super::mesh_buffers::{MeshBuffers, PointTriangles};
 use super::shadow::SIZE_PX;
 use super::tangents::Tangents;
 use super::view::light_from_world;
 use crate::geom::SurfaceMesh;
-use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, storage, uniform};
+use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, uniform};
 use crate::scene::{LIGHTS_MAX, PlacedLight};
 use glam::{Mat4, Vec3};
 
@@ -26,9 +26,7 @@ pub struct LightViews {
 pub struct DepthMaps {
     /// A draw and its matrix for each light.
     draws: Vec<(Draw, wgpu::Buffer)>,
-    /// Corners of the triangles as points: the maps need no texture coordinates.
-    indices: wgpu::Buffer,
-    index_count: u32,
+    triangles: PointTriangles,
     /// Depth, 0 near the light to 1 far, a square for each light.
     pub depth: Target,
     /// Packed normal of the surface at each entry; never written where nothing is entered.
@@ -93,11 +91,9 @@ impl DepthMaps {
             })
             .collect::<Result<Vec<_>, GpuError>>()?;
         let size = [SIZE_PX * light_count.max(1) as u32, SIZE_PX];
-        let indices = mesh.point_triangles();
         Ok(Self {
             draws,
-            indices: storage(gpu, "depth map triangles", indices.as_flattened())?,
-            index_count: 3 * indices.len() as u32,
+            triangles: PointTriangles::new(gpu, mesh)?,
             depth: Target::new(gpu, Self::NAME, size, super::DEPTH_FORMAT),
             normals: Target::new(gpu, "entry normals", size, NORMAL_FORMAT),
             views: uniform(gpu, Self::NAME, &views(&[], &[])),
@@ -130,9 +126,7 @@ impl DepthMaps {
                 .write_buffer(matrix, 0, bytemuck::bytes_of(&views.clip_from_world[k]));
             pass.set_viewport(k as f32 * side, 0.0, side, side, 0.0, 1.0);
             draw.set(&mut pass);
-            pass.set_vertex_buffer(0, mesh.positions.slice(..));
-            pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
-            pass.draw_indexed(0..self.index_count, 0, 0..1);
+            self.triangles.draw(&mesh.positions, &mut pass);
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use super::draw::{DepthUse, Draw, DrawKind, Target, cleared};
 use super::green::Green;
-use super::lightmap::uv_per_m;
+use super::lightmap::{light_map_size_px, uv_per_m};
 use super::maps::{Maps, level_for};
 use super::mesh_buffers::MeshBuffers;
 use super::tangents::Tangents;
@@ -116,7 +116,7 @@ impl Diffusion {
         surface_mesh: &SurfaceMesh,
         inputs: &DiffusionInputs<'_>,
     ) -> Result<Self, GpuError> {
-        let size = [section.light_map_size_px; 2];
+        let size = [light_map_size_px(section, surface_mesh); 2];
         let light = Target::new(gpu, Self::NAME, size, FORMAT);
         let metric = Target::new(gpu, "metric", size, FORMAT);
         let draw = light_draw(gpu, section, surface_mesh, inputs)?;
@@ -214,7 +214,7 @@ impl Diffusion {
 
 /// Mean texels of the light map on a metre of the surface at rest.
 pub fn texels_per_m(section: &SurfaceSection, mesh: &SurfaceMesh) -> f32 {
-    section.light_map_size_px as f32 * uv_per_m(mesh)
+    light_map_size_px(section, mesh) as f32 * uv_per_m(mesh)
 }
 
 /// The profile of the layer that light wanders in, as wide as the scene asks.
@@ -290,7 +290,8 @@ fn light_draw(
     } else {
         Diffusion::WGSL
     };
-    let color_level = level_for(inputs.map_size_px as f32 / section.light_map_size_px as f32);
+    let size_px = light_map_size_px(section, surface_mesh);
+    let color_level = level_for(inputs.map_size_px as f32 / size_px as f32);
     let mut constants = inputs.light_constants.to_vec();
     constants.extend([
         (

@@ -1,16 +1,14 @@
 //! Where view rays leave the body again: the nearest back faces, one draw a frame.
 
 use super::draw::{DepthUse, Draw, DrawKind, Target, cleared_depth};
-use super::mesh_buffers::MeshBuffers;
+use super::mesh_buffers::{MeshBuffers, PointTriangles};
 use crate::geom::SurfaceMesh;
-use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, storage};
+use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join};
 
 /// Depth of the back faces as the eye sees them.
 pub struct Exit {
     draw: Draw,
-    /// Corners of the triangles as points: depth needs no texture coordinates.
-    indices: wgpu::Buffer,
-    index_count: u32,
+    triangles: PointTriangles,
     /// Depth of the nearest back face at each pixel, 1 where there is none.
     pub target: Target,
 }
@@ -48,11 +46,9 @@ impl Exit {
             },
             &[Binding::Uniform(frame)],
         )?;
-        let indices = mesh.point_triangles();
         Ok(Self {
             draw,
-            indices: storage(gpu, "exit triangles", indices.as_flattened())?,
-            index_count: 3 * indices.len() as u32,
+            triangles: PointTriangles::new(gpu, mesh)?,
             target: Target::new(gpu, Self::NAME, size, super::DEPTH_FORMAT),
         })
     }
@@ -76,8 +72,6 @@ impl Exit {
             ..Default::default()
         });
         self.draw.set(&mut pass);
-        pass.set_vertex_buffer(0, mesh.positions.slice(..));
-        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(0..self.index_count, 0, 0..1);
+        self.triangles.draw(&mesh.positions, &mut pass);
     }
 }

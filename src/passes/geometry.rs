@@ -106,6 +106,8 @@ impl Geometry {
             ("base_fragment", &[FORMAT])
         };
         let primitive = match primitives {
+            // Layers seen through a shift read none.
+            _ if section.kind == SurfaceKind::Gooey => 3.0,
             Primitives::Tangent | Primitives::DepthMaps => 0.0,
             Primitives::Planes(_) => 1.0,
             Primitives::Quadrics(_) => 2.0,

@@ -8,11 +8,16 @@ use super::tangents::Tangents;
 use crate::geom::SurfaceMesh;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, uniform};
 use crate::optics::blur::{TAP_PAIRS, taps};
-use crate::scene::{SurfaceSection, UvMetric};
+use crate::scene::{SurfaceKind, SurfaceSection, UvMetric};
 use glam::Vec3;
 
 /// Format of the maps: irradiance, and the number of the chart or coverage in alpha; metric and thickness.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+
+/// Side of a map that a scene says nothing of [px], at least and at most.
+const SIZES_PX: [u32; 2] = [96, 256];
+/// Texels on the radius of the blur of such a map.
+const TEXELS_A_RADIUS: f32 = 2.0;
 
 /// Turn of the disc between two passes [rad]: neighbours of one pass are not those of the next.
 const TURN: f32 = 0.5;
@@ -123,12 +128,13 @@ impl LightMap {
         inputs: &LightMapInputs<'_>,
         [source, blur_source]: [&str; 2],
     ) -> Result<Self, GpuError> {
-        let size = [section.light_map_size_px; 2];
+        let size_px = light_map_size_px(section, surface_mesh);
+        let size = [size_px; 2];
         let maps = [(); 2].map(|()| Target::new(gpu, Self::NAME, size, FORMAT));
         let metric = Target::new(gpu, "metric", size, FORMAT);
         let rest = charts_at_rest(gpu, surface_mesh)?;
         let yes = |is: bool| f64::from(u8::from(is));
-        let color_level = level_for(inputs.map_size_px as f32 / section.light_map_size_px as f32);
+        let color_level = level_for(inputs.map_size_px as f32 / size_px as f32);
         let mut constants = inputs.light_constants.to_vec();
         constants.extend([
             ("UNIT_FRAMES", yes(section.uv_metric == UvMetric::Unit)),
@@ -258,6 +264,21 @@ impl Blur {
         )?;
         Ok(Self { draw, knobs })
     }
+}
+
+/// Side of a light map [px]: what `section` says, and otherwise what the surface needs.
+///
+/// The blur of `gooey` leaves no detail finer than its disc, so the radius of that has two texels, of a body as it was
+/// when the map was made: against 512 texels the picture of a bundled organ differs by 0.07 % RMS, of 256 by 0.05 %.
+pub fn light_map_size_px(section: &SurfaceSection, mesh: &SurfaceMesh) -> u32 {
+    section.light_map_size_px.unwrap_or_else(|| {
+        if section.kind != SurfaceKind::Gooey || section.blur_passes == 0 {
+            return SIZES_PX[1];
+        }
+        let radius = section.blur_radius_m * uv_per_m(mesh);
+        let wanted = (TEXELS_A_RADIUS / radius.max(1e-6)).ceil() as u32;
+        wanted.clamp(SIZES_PX[0], SIZES_PX[1])
+    })
 }
 
 /// Mean length in texture space of a metre on the surface, from the areas of its triangles.

@@ -1,10 +1,10 @@
 //! The shadow map of the light that casts shadows: the surface and the tools before it, a draw each.
 
 use super::draw::{DepthUse, Draw, DrawKind, Target, cleared_depth};
-use super::mesh_buffers::MeshBuffers;
+use super::mesh_buffers::{MeshBuffers, PointTriangles};
 use super::tools::Tools;
 use crate::geom::SurfaceMesh;
-use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, storage, uniform};
+use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, uniform};
 use glam::Mat4;
 
 /// Side of the map [px].
@@ -15,9 +15,7 @@ pub struct Shadow {
     draw: Draw,
     draw_tools: Draw,
     matrix: wgpu::Buffer,
-    /// Corners of the triangles as points: the map needs no texture coordinates.
-    indices: wgpu::Buffer,
-    index_count: u32,
+    triangles: PointTriangles,
     /// The map.
     pub target: Target,
 }
@@ -72,13 +70,11 @@ impl Shadow {
             },
             &[Binding::Uniform(&matrix), places, directions],
         )?;
-        let indices = mesh.point_triangles();
         Ok(Self {
             draw,
             draw_tools,
             matrix,
-            indices: storage(gpu, "shadow triangles", indices.as_flattened())?,
-            index_count: 3 * indices.len() as u32,
+            triangles: PointTriangles::new(gpu, mesh)?,
             target: Target::new(gpu, Self::NAME, [SIZE_PX; 2], super::DEPTH_FORMAT),
         })
     }
@@ -105,9 +101,7 @@ impl Shadow {
             ..Default::default()
         });
         self.draw.set(&mut pass);
-        pass.set_vertex_buffer(0, mesh.positions.slice(..));
-        pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(0..self.index_count, 0, 0..1);
+        self.triangles.draw(&mesh.positions, &mut pass);
         if tool_count > 0 {
             self.draw_tools.set(&mut pass);
             tools.draw(&mut pass, tool_count);

@@ -58,8 +58,8 @@ pub struct SurfaceSection {
     pub blur_passes: u32,
     /// `gooey`: multiplies the opacity of the outer layer.
     pub outer_opacity: f32,
-    /// `gooey`, `diffusion`: side of the light map [px].
-    pub light_map_size_px: u32,
+    /// `gooey`, `diffusion`: side of the light map [px]; left out, 256, and for `gooey` no more than its blur asks for.
+    pub light_map_size_px: Option<u32>,
     /// How texture coordinates below the surface follow it as it stretches.
     pub uv_metric: UvMetric,
     /// Whether layers thin where the surface stretches, as tissue does that keeps its volume.
@@ -234,7 +234,7 @@ impl Default for SurfaceSection {
             blur_radius_m: 0.004,
             blur_passes: 2,
             outer_opacity: 1.0,
-            light_map_size_px: 256,
+            light_map_size_px: None,
             uv_metric: UvMetric::default(),
             thickness_follows_volume: false,
             relief: 1.0,
@@ -369,12 +369,9 @@ impl SurfaceSection {
         self.absorption.check(c);
         self.diffusion.check(c);
         c.range("surface.roughness", self.roughness, 0.02, 1.0);
-        c.range(
-            "surface.light_map_size_px",
-            self.light_map_size_px as f32,
-            32.0,
-            4096.0,
-        );
+        if let Some(size_px) = self.light_map_size_px {
+            c.range("surface.light_map_size_px", size_px as f32, 32.0, 4096.0);
+        }
     }
 }
 
