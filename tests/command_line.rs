@@ -415,6 +415,20 @@ fn every_bundled_scene_is_listed_and_sound() {
 }
 
 #[test]
+fn one_who_stops_reading_ends_nothing() {
+    let mut scenes = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .arg("scenes")
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("the binary runs");
+    drop(scenes.stdout.take());
+    let ended = scenes.wait_with_output().expect("it ends");
+    assert!(ended.status.success(), "{ended:?}");
+    assert!(ended.stderr.is_empty(), "{ended:?}");
+}
+
+#[test]
 fn two_runs_are_compared_stage_by_stage_and_a_folder_without_a_run_is_refused() {
     let folder = Folder::new("compare");
     replay(&folder, "a", &[]);

@@ -1,6 +1,6 @@
 //! `palpate check`: says what files hold, or what is wrong with them.
 
-use super::{AppError, Outcome, Session, load};
+use super::{AppError, Outcome, Session, load, say::say};
 use crate::geom::import::describe;
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ pub fn check(files: &[PathBuf]) -> Result<Outcome, AppError> {
     let mut wrong = 0;
     for file in files {
         match one(file) {
-            Ok(text) => println!("{}\n{}", file.display(), indented(&text)),
+            Ok(text) => say(&format!("{}\n{}", file.display(), indented(&text))),
             Err(error) => {
                 let text = error.to_string();
                 let name = file.display().to_string();

@@ -20,6 +20,7 @@ mod push;
 mod record;
 mod renderer;
 mod replay;
+mod say;
 mod script;
 mod section;
 mod session;
@@ -70,7 +71,7 @@ pub enum Outcome {
 pub fn list_scenes() -> Result<Outcome, AppError> {
     for (name, _) in assets::scenes() {
         let scene = load::scene(name, &[])?;
-        println!("{name:<14} {}", scene.title);
+        say::say(&format!("{name:<14} {}", scene.title));
     }
     Ok(Outcome::Done)
 }
@@ -83,10 +84,8 @@ pub fn list_scenes() -> Result<Outcome, AppError> {
 pub fn compare(a: &Path, b: &Path) -> Result<Outcome, AppError> {
     let runs = [TimedRun::read(a)?, TimedRun::read(b)?];
     let names = [a, b].map(|folder| folder.display().to_string());
-    print!(
-        "{}",
-        told(names.each_ref().map(String::as_str), runs.each_ref())
-    );
+    let text = told(names.each_ref().map(String::as_str), runs.each_ref());
+    say::say(text.trim_end());
     Ok(Outcome::Done)
 }
 

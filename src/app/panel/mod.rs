@@ -120,7 +120,7 @@ impl PanelState {
             asleep: false,
             frozen_particles: 0,
             error: None,
-            message: String::new(),
+            message: session.notes.join("\n"),
         }
     }
 

@@ -7,7 +7,7 @@ mod score;
 pub use scene::ReferenceScene;
 pub use score::{full_reference as read_full_reference, reference as read_reference};
 
-use super::{AppError, Outcome, Still, VERSION_COMMIT, VERSION_NUMBER};
+use super::{AppError, Outcome, Still, VERSION_COMMIT, VERSION_NUMBER, say::say};
 use crate::gpu::Gpu;
 use crate::measure::files::{create_folder, write, write_npy};
 use crate::measure::page::{Block, Page, Section, Table};
@@ -56,7 +56,7 @@ pub fn validate(options: &ValidateOptions) -> Result<Outcome, AppError> {
     write_all(&options.out, &gpu.adapter, surface, &rows)?;
     let missed = rows.iter().filter(|row| row.missed()).count();
     let met = rows.iter().filter(|row| row.goal.is_some()).count() - missed;
-    println!("{met} goals met, {missed} missed");
+    say(&format!("{met} goals met, {missed} missed"));
     Ok(if missed == 0 {
         Outcome::Done
     } else {
@@ -182,7 +182,7 @@ fn write_all(
         head: score::HEAD.map(str::to_owned).to_vec(),
         rows: rows.iter().map(Scored::cells).collect(),
     };
-    print!("{}", table.text());
+    say(table.text().trim_end());
     let mut csv = csv::Writer::from_writer(Vec::new());
     let lines = std::iter::once(&table.head).chain(&table.rows);
     for line in lines {

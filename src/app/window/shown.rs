@@ -95,6 +95,9 @@ impl Shown {
     ) -> Result<Self, AppError> {
         let mut screen = Screen::new(event_loop)?;
         session.script_plays = false;
+        for note in &session.notes {
+            eprintln!("{scene_name}: {note}");
+        }
         let renderer = Renderer::new(screen.gpu.clone(), &session, screen.size())?;
         screen.show_picture(renderer.picture_view());
         let orbit = renderer.scene_orbit(&session);
