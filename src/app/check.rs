@@ -13,7 +13,7 @@ pub fn check(files: &[PathBuf]) -> Result<Outcome, AppError> {
     let mut wrong = 0;
     for file in files {
         match one(file) {
-            Ok(text) => say(&format!("{}\n{}", file.display(), indented(&text))),
+            Ok(text) => say(&format!("{}\n{}\n", file.display(), indented(&text))),
             Err(error) => {
                 let text = error.to_string();
                 let name = file.display().to_string();

@@ -4,6 +4,7 @@ use super::green_knobs as green;
 use super::panel::PanelAsk;
 use super::slider::{Slider, three};
 use crate::optics::OpticalTissue;
+use crate::passes::lightmap::SIZES_PX;
 use crate::scene::{
     InnerLight, InnerTaps, Multiple, Noise, Quadrature, SurfaceKind, SurfaceSection, UvMetric,
 };
@@ -193,7 +194,7 @@ fn gooey(ui: &mut Ui, surface: &mut SurfaceSection) {
         .checkbox(&mut by_blur, "light map as fine as the blur asks")
         .changed()
     {
-        surface.light_map_size_px = (!by_blur).then_some(256);
+        surface.light_map_size_px = (!by_blur).then_some(SIZES_PX[1]);
     }
     if let Some(size_px) = &mut surface.light_map_size_px {
         ui.add(

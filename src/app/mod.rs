@@ -20,7 +20,7 @@ mod push;
 mod record;
 mod renderer;
 mod replay;
-mod say;
+pub mod say;
 mod script;
 mod section;
 mod session;
@@ -71,7 +71,7 @@ pub enum Outcome {
 pub fn list_scenes() -> Result<Outcome, AppError> {
     for (name, _) in assets::scenes() {
         let scene = load::scene(name, &[])?;
-        say::say(&format!("{name:<14} {}", scene.title));
+        say::say(&format!("{name:<14} {}\n", scene.title));
     }
     Ok(Outcome::Done)
 }
@@ -84,8 +84,7 @@ pub fn list_scenes() -> Result<Outcome, AppError> {
 pub fn compare(a: &Path, b: &Path) -> Result<Outcome, AppError> {
     let runs = [TimedRun::read(a)?, TimedRun::read(b)?];
     let names = [a, b].map(|folder| folder.display().to_string());
-    let text = told(names.each_ref().map(String::as_str), runs.each_ref());
-    say::say(text.trim_end());
+    say::say(&told(names.each_ref().map(String::as_str), runs.each_ref()));
     Ok(Outcome::Done)
 }
 

@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-/// Writes `text` and a line's end. That nobody reads on, as after `palpate scenes | head -1`, is no fault of the command.
+/// Writes `text`. That nobody reads on, as after `palpate scenes | head -1`, is no fault of the command.
 pub fn say(text: &str) {
-    let _ = writeln!(std::io::stdout(), "{text}");
+    let _ = std::io::stdout().write_all(text.as_bytes());
 }

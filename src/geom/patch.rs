@@ -168,7 +168,7 @@ impl Site {
 
 /// Points sorted so that each run of 32, and within it of 16, 8 and 4, is compact: halved along the
 /// longest side of their box until 4 are left.
-pub fn spatial_order(points: &[Vec3]) -> Vec<u32> {
+fn spatial_order(points: &[Vec3]) -> Vec<u32> {
     fn halve(points: &[Vec3], order: &mut [u32]) {
         if order.len() <= 4 {
             order.sort_unstable();

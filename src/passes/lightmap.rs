@@ -15,7 +15,7 @@ use glam::Vec3;
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 
 /// Side of a map that a scene says nothing of [px], at least and at most.
-const SIZES_PX: [u32; 2] = [96, 256];
+pub const SIZES_PX: [u32; 2] = [96, 256];
 /// Texels on the radius of the blur of such a map.
 const TEXELS_A_RADIUS: f32 = 2.0;
 

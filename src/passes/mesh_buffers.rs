@@ -1,6 +1,6 @@
 //! The surface on the GPU: what every pass reads, and the one upload a frame.
 
-use crate::geom::{SurfaceMesh, patch::spatial_order};
+use crate::geom::SurfaceMesh;
 use crate::gpu::{Entry, Gpu, GpuError, Table, storage};
 use glam::Vec3;
 
@@ -15,7 +15,7 @@ pub struct MeshBuffers {
     pub point_of: wgpu::Buffer,
     /// Texture coordinate of each vertex, `[vec2f; vertices]`.
     pub uvs: wgpu::Buffer,
-    /// Vertices of the triangles, neighbours together, `[u32; 3 * triangles]`.
+    /// Vertices of the triangle list, `[u32; 3 * triangles]`; also an index buffer.
     pub indices: wgpu::Buffer,
     /// Places that move.
     pub point_count: u32,
@@ -40,11 +40,7 @@ impl MeshBuffers {
             position_table: Table::new(gpu, "positions", Entry::Floats, &places)?,
             point_of: storage(gpu, "point of each vertex", &mesh.point_of)?,
             uvs: storage(gpu, "texture coordinates", &mesh.uvs)?,
-            indices: storage(
-                gpu,
-                "triangles",
-                nearby(mesh, &mesh.triangles).as_flattened(),
-            )?,
+            indices: storage(gpu, "triangles", mesh.triangles.as_flattened())?,
             point_count: mesh.points.len() as u32,
             vertex_count: mesh.uvs.len() as u32,
             index_count: 3 * mesh.triangles.len() as u32,
@@ -106,7 +102,7 @@ impl PointTriangles {
     ///
     /// [`GpuError::BufferTooLarge`] if the adapter can't bind the list.
     pub fn new(gpu: &Gpu, mesh: &SurfaceMesh) -> Result<Self, GpuError> {
-        let triangles = nearby(mesh, &mesh.point_triangles());
+        let triangles = mesh.point_triangles();
         Ok(Self {
             indices: storage(gpu, "triangles of points", triangles.as_flattened())?,
             count: 3 * triangles.len() as u32,
@@ -119,25 +115,6 @@ impl PointTriangles {
         pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.draw_indexed(0..self.count, 0, 0..1);
     }
-}
-
-/// `triangles` of `mesh`, one each, sorted so that neighbours follow each other: their vertices are still at hand then,
-/// and are not worked out again.
-fn nearby(mesh: &SurfaceMesh, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
-    let middles: Vec<Vec3> = (0..triangles.len())
-        .map(|triangle| {
-            let corners = mesh.point_triangle(triangle);
-            corners
-                .map(|p| mesh.points[p as usize])
-                .iter()
-                .sum::<Vec3>()
-                / 3.0
-        })
-        .collect();
-    spatial_order(&middles)
-        .into_iter()
-        .map(|triangle| triangles[triangle as usize])
-        .collect()
 }
 
 fn places(points: &[Vec3], volumes: &[f32]) -> Vec<[f32; 4]> {

@@ -42,8 +42,8 @@ impl Oracle {
     ///
     /// # Errors
     ///
-    /// [`AppError::Body`] if the body has no equilibrium, or a step of its motion no solution; [`AppError::File`] if the file can't be
-    /// written.
+    /// [`AppError::Body`] if the body has no equilibrium, or a step of its motion no solution;
+    /// [`AppError::File`] if the file can't be written.
     pub fn kept(
         file: &Path,
         body: &HeldBody,

@@ -4,10 +4,9 @@ use super::Study;
 use super::document::Document;
 use super::run::DocumentOf;
 use super::sweep::Sweep;
-use crate::app::AppError;
+use crate::app::{AppError, say::say};
 use crate::measure::files;
 use crate::measure::page::{Page, Section};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Where a study's rows are.
@@ -27,8 +26,7 @@ pub fn write<S: Sweep>(out: &Path, document: &DocumentOf<S>) -> Result<(), AppEr
     files::write(&out.join(format!("{name}.svg")), findings.svg.as_bytes())?;
     files::write(&json_file(out, S::STUDY), document.json().as_bytes())?;
     report(out)?;
-    // A reader that closed the pipe has seen enough.
-    let _ = std::io::stdout().write_all(findings.text().as_bytes());
+    say(&findings.text());
     eprintln!("{}", out.join("report.html").display());
     Ok(())
 }

@@ -56,7 +56,7 @@ pub fn validate(options: &ValidateOptions) -> Result<Outcome, AppError> {
     write_all(&options.out, &gpu.adapter, surface, &rows)?;
     let missed = rows.iter().filter(|row| row.missed()).count();
     let met = rows.iter().filter(|row| row.goal.is_some()).count() - missed;
-    say(&format!("{met} goals met, {missed} missed"));
+    say(&format!("{met} goals met, {missed} missed\n"));
     Ok(if missed == 0 {
         Outcome::Done
     } else {
@@ -182,7 +182,7 @@ fn write_all(
         head: score::HEAD.map(str::to_owned).to_vec(),
         rows: rows.iter().map(Scored::cells).collect(),
     };
-    say(table.text().trim_end());
+    say(&table.text());
     let mut csv = csv::Writer::from_writer(Vec::new());
     let lines = std::iter::once(&table.head).chain(&table.rows);
     for line in lines {
