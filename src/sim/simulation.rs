@@ -400,12 +400,14 @@ impl Simulation {
             self.move_on(&Team::alone())
         };
         let speed_max_m_s = self.particles.speed_max_m_s();
-        // By the way and not the speed: where something presses, light particles tremble. A body that is
-        // led back rests nowhere, though a load may hold it still: its own material is yet to answer.
+        // By the way and not the speed: where something presses, light particles tremble by less. A tremble of two
+        // substeps is back where it was as a step ends, so the way of a substep counts too. A body that is led back
+        // rests nowhere, though a load may hold it still: its own material is yet to answer.
         let way_max_m = CALM_SIZES * self.size_m;
+        let goes = speed_max_m_s * self.solver.substep_s() > way_max_m
+            || self.particles.farthest_m(&self.calm_places) > way_max_m;
         let beats = self.beating.as_ref().is_some_and(Beating::works);
-        let is_led = self.model.is_restoring();
-        if stirred || beats || is_led || self.particles.farthest_m(&self.calm_places) > way_max_m {
+        if stirred || beats || goes || self.model.is_restoring() {
             self.calm_places.copy_from_slice(&self.particles.places);
             self.calm_steps = 0;
         } else {

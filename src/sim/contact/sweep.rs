@@ -8,8 +8,9 @@ use glam::Vec3;
 
 /// Contact is declared this share of the radius early.
 const EARLY_RADII: f32 = 1e-3;
-/// More advances than any triangle needed in a million random ones (57).
-const ADVANCES_MAX: u32 = 100;
+/// Most triangles need a handful of advances; one that turns as it grazes the tool needs hundreds, since each gets it
+/// nearer by a share only.
+const ADVANCES_MAX: u32 = 10_000;
 
 /// A place of a triangle that comes to a tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,6 +100,24 @@ mod tests {
     fn face_through_the_axis_has_a_finite_normal() {
         let hit = sweep(BALL, RADIUS_M, WIDE, WIDE).expect("the face is inside");
         assert!(hit.normal.is_normalized());
+    }
+
+    #[test]
+    fn triangle_that_turns_as_it_grazes_the_tool_is_not_stopped_early() {
+        let axis = [Vec3::ZERO, Vec3::new(0.015803857, 0.019463677, 0.006875801)];
+        let start = [
+            Vec3::new(-0.05354994, 0.03733453, 0.01718846),
+            Vec3::new(0.0495393, 0.09823134, 0.03664695),
+            Vec3::new(0.033220086, 0.0057562226, -0.06403199),
+        ];
+        let end = [
+            Vec3::new(0.057890553, -0.078817606, 0.07224821),
+            Vec3::new(0.067363754, 0.021087047, 0.004620835),
+            Vec3::new(-0.068220645, 0.08126229, 0.019204639),
+        ];
+        let closest = sampled_distance(axis, start, end);
+        assert!(closest > RADIUS_M + 2e-5, "{closest} m");
+        assert_eq!(sweep(axis, RADIUS_M, start, end), None);
     }
 
     /// Smallest distance of the moving triangle to the axis over small steps [m], in f64.
