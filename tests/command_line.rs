@@ -120,6 +120,7 @@ fn a_summary_has_every_key_that_scripts_read() {
         "timestep_s",
         "size",
         "mesh",
+        "solver",
         "frame_ms",
         "sim_ms",
         "passes",

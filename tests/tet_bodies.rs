@@ -409,6 +409,54 @@ fn poor_tetrahedra_of_stiffer_tissue_come_to_rest() {
 }
 
 #[test]
+fn poor_tetrahedra_that_tremble_are_handed_over_which_is_said_and_come_to_rest() {
+    let mut session = session(ORGAN, &["solver.youngs_modulus_pa=2500"]).expect("a sound scene");
+    assert_eq!(session.solver(), session.scene.solver);
+    let mut speed_m_s = f32::INFINITY;
+    for _ in 0..240 {
+        speed_m_s = session.tick().report.speed_max_m_s;
+    }
+    assert!(speed_m_s < 1e-3, "{speed_m_s} m/s");
+    assert_eq!(session.solver().method, Method::Implicit);
+    let told = (session.notes.iter()).filter(|note| note.contains("trembled"));
+    assert_eq!(told.count(), 1, "{:?}", session.notes);
+}
+
+#[test]
+fn pressed_tissue_is_not_taken_for_trembling() {
+    let mut session = session(include_str!("../scenes/slab.toml"), &[]).expect("a sound scene");
+    for _ in 0..180 {
+        session.tick();
+    }
+    assert_eq!(session.handed_over_frame(), None, "{:?}", session.notes);
+}
+
+#[test]
+fn poor_tetrahedra_tremble_with_even_substeps_as_with_odd_ones() {
+    // Asleep, a body is still: the tremble of two substeps is over as a step of 40 ends.
+    for substeps in [39, 40, 41] {
+        let mut session =
+            session(ORGAN, &["solver.youngs_modulus_pa=2500"]).expect("a sound scene");
+        let mut simulation = Simulation::new(
+            session.simulation().setup().clone(),
+            SolverParams {
+                substeps,
+                youngs_modulus_pa: 1e4,
+                ..session.scene.solver
+            },
+        );
+        let mut report = session.tick().report;
+        for _ in 0..150 {
+            report = simulation.step(&[]);
+        }
+        assert!(
+            !report.asleep && report.speed_max_m_s > 0.01,
+            "{substeps}: {report:?}"
+        );
+    }
+}
+
+#[test]
 fn a_modulus_that_changes_while_it_runs_changes_the_method_and_back() {
     let mut session = session(BEAM, &[]).expect("a sound scene");
     session.scene.solver.youngs_modulus_pa = 4e5;

@@ -9,7 +9,8 @@ use crate::measure::report::{self, replay_page};
 use crate::measure::states::States;
 use crate::measure::stats::Stats;
 use crate::measure::summary::{
-    MarkerSummary, MaxFinal, MeshCounts, RefitSummary, Summary, ToolSummary, passes, write_summary,
+    MarkerSummary, MaxFinal, MeshCounts, RefitSummary, SolverSummary, Summary, ToolSummary, passes,
+    write_summary,
 };
 use crate::measure::trace::{Span, write_trace};
 use crate::passes::frame::{FramePlan, effective_method};
@@ -232,6 +233,12 @@ impl Recording {
                 vertices: session.mesh.uvs.len(),
                 triangles: session.mesh.triangles.len(),
                 tets: session.tet_count(),
+            },
+            solver: SolverSummary {
+                method: session.solver().method.name().to_owned(),
+                substeps: session.solver().substeps,
+                iterations: session.solver().iterations,
+                handed_over_frame: session.handed_over_frame(),
             },
             frame_ms: Stats::of(self.records.iter().map(|r| r.wall_ms)),
             sim_ms: Stats::of(self.records.iter().map(|r| r.sim_ms)),

@@ -33,6 +33,7 @@ pub struct Session {
     script: Script,
     markers: Vec<Marker>,
     frame: u32,
+    handed_over_frame: Option<u32>,
 }
 
 /// What one time step did.
@@ -78,7 +79,7 @@ impl Session {
             .collect::<Result<_, _>>()?;
         let mut simulation = Simulation::new(setup, scene.solver);
         simulation.set_threads(Some(threads));
-        hand_over_if_stiff(&mut simulation);
+        let is_handed = hand_over_if_stiff(&mut simulation);
         simulation.set_beat(BeatSection::beat(scene.body.beat.as_ref()));
         let mut notes = notes;
         notes.extend(solver_notes(&scene, &simulation));
@@ -88,6 +89,7 @@ impl Session {
             script_plays: true,
             hand: None,
             frame: 0,
+            handed_over_frame: is_handed.then_some(0),
             scene,
             mesh,
             rest,
@@ -104,7 +106,12 @@ impl Session {
         let start = Instant::now();
         let report = self.simulation.step(&tools);
         if self.simulation.sags() && hand_over_if_stiff(&mut self.simulation) {
-            self.note_hand_over();
+            self.note_hand_over("waves grew in the tissue, which is too stiff for");
+        } else if self.simulation.trembles() {
+            hand_over(&mut self.simulation);
+            self.note_hand_over(
+                "some of the tissue had trembled for half a second, as poor tetrahedra do by",
+            );
         }
         Tick {
             report,
@@ -113,11 +120,12 @@ impl Session {
         }
     }
 
-    /// Says once that waves grew in the body, and what is done from here on.
-    fn note_hand_over(&mut self) {
+    /// Says once `why` the body was handed over, and what is done from here on.
+    fn note_hand_over(&mut self, why: &str) {
+        self.handed_over_frame = Some(self.frame);
         let taken = self.solver();
         let note = format!(
-            "in frame {} waves grew in the tissue, which is too stiff for {} in {}: from there on {} is taken, in {}",
+            "in frame {} {why} {} in {}: from there on {} is taken, in {}",
             self.frame,
             self.scene.solver.method.name(),
             substeps(self.scene.solver.substeps),
@@ -185,7 +193,7 @@ impl Session {
         self.simulation
             .set_gravity_and_damping(body.gravity_m_s2, body.damping_per_s);
         self.simulation.set_params(self.scene.solver);
-        hand_over_if_stiff(&mut self.simulation);
+        self.handed_over_frame = hand_over_if_stiff(&mut self.simulation).then_some(self.frame);
     }
 
     /// Takes over a changed heartbeat.
@@ -197,6 +205,11 @@ impl Session {
     /// Method, material and time step that are taken: the scene's, or `implicit` if its tissue asks for that.
     pub fn solver(&self) -> SolverParams {
         self.simulation.params()
+    }
+
+    /// The frame from which on another solver is taken than the scene's, 0 from the start; `None` if it is that.
+    pub fn handed_over_frame(&self) -> Option<u32> {
+        self.handed_over_frame
     }
 
     /// Time steps since the start.
@@ -257,14 +270,18 @@ const HANDED_SUBSTEPS_MAX: u32 = 4;
 fn hand_over_if_stiff(simulation: &mut Simulation) -> bool {
     let stiff = simulation.faithful_substeps().is_some();
     if stiff {
-        let asked = simulation.params();
-        simulation.set_params(SolverParams {
-            method: Method::Implicit,
-            substeps: asked.substeps.min(HANDED_SUBSTEPS_MAX),
-            ..asked
-        });
+        hand_over(simulation);
     }
     stiff
+}
+
+fn hand_over(simulation: &mut Simulation) {
+    let asked = simulation.params();
+    simulation.set_params(SolverParams {
+        method: Method::Implicit,
+        substeps: asked.substeps.min(HANDED_SUBSTEPS_MAX),
+        ..asked
+    });
 }
 
 /// "1 substep", "4 substeps".

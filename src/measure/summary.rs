@@ -27,6 +27,8 @@ pub struct Summary {
     pub size: [u32; 2],
     /// How large the body is.
     pub mesh: MeshCounts,
+    /// The solver that moved it at the end.
+    pub solver: SolverSummary,
     /// Wall time of a frame [ms]; null without frames.
     pub frame_ms: Option<Stats>,
     /// Wall time of the simulation of a frame [ms]; null without frames.
@@ -64,6 +66,19 @@ pub struct MeshCounts {
     pub triangles: usize,
     /// Tetrahedra of the simulated body.
     pub tets: usize,
+}
+
+/// The solver that moved the body at the end, which may not be the one that the scene asked for.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct SolverSummary {
+    /// Name of the method.
+    pub method: String,
+    /// Substeps of a frame.
+    pub substeps: u32,
+    /// Iterations of a substep.
+    pub iterations: u32,
+    /// Frame from which on it took the place of what the scene asks for, 0 from the start; null if it is that.
+    pub handed_over_frame: Option<u32>,
 }
 
 /// One pass over the run.
@@ -225,6 +240,12 @@ pub(super) mod tests {
                 triangles: 8544,
                 tets: 10213,
             },
+            solver: SolverSummary {
+                method: "implicit".to_owned(),
+                substeps: 4,
+                iterations: 1,
+                handed_over_frame: Some(37),
+            },
             frame_ms: Stats::of(records.iter().map(|record| record.wall_ms)),
             sim_ms: Stats::of(records.iter().map(|record| record.sim_ms)),
             passes: passes(records, |_| 1),
@@ -262,12 +283,16 @@ pub(super) mod tests {
         assert_eq!(
             keys(&json),
             "adapter commit finite first_frame_s frame_ms frames inverted_tets left_out markers mesh \
-             passes refit scene sim_ms size speed_max_final_m_s state_sha256 threads timestep_s tool \
+             passes refit scene sim_ms size solver speed_max_final_m_s state_sha256 threads timestep_s tool \
              version volume_drift"
         );
         assert_eq!(keys(&json["frame_ms"]), "low1pct max p50 p95 p99");
         assert_eq!(keys(&json["sim_ms"]), "low1pct max p50 p95 p99");
         assert_eq!(keys(&json["mesh"]), "tets triangles vertices");
+        assert_eq!(
+            keys(&json["solver"]),
+            "handed_over_frame iterations method substeps"
+        );
         assert_eq!(keys(&json["inverted_tets"]), "final max");
         assert_eq!(keys(&json["volume_drift"]), "final max");
         assert_eq!(keys(&json["tool"]), "force_max_n penetration_max_m");

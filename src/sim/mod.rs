@@ -6,6 +6,7 @@
 
 mod beat;
 mod beating;
+mod calm;
 mod coloring;
 pub mod constraint;
 mod contact;

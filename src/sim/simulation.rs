@@ -3,6 +3,7 @@
 use super::{
     Beat, BodySetup, SolverParams, StepReport, ToolInput,
     beating::Beating,
+    calm::Calm,
     contact::{DEPENETRATION_SPEED_M_S, Surface},
     diagnose::rest_volume_m3,
     grab::Tissue,
@@ -14,13 +15,8 @@ use super::{
     tools::{Met, Tools},
 };
 use crate::geom::bounds;
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 
-/// A body that goes nowhere by more than this many of its sizes is calm.
-const CALM_SIZES: f32 = 1e-4;
-/// Calm for so long, it falls asleep [s]: longer than it hangs still at the turning point of a
-/// swing.
-const CALM_S: f32 = 0.5;
 /// Tetrahedra a chunk, in adding up volumes: some microseconds.
 const TETS_PER_CHUNK: usize = 1024;
 /// Points a chunk, in bringing the surface up to date: some microseconds.
@@ -51,10 +47,7 @@ pub struct Simulation {
     point_volumes: Vec<f32>,
     point_bounds: (Vec3, Vec3),
     report: StepReport,
-    /// Where the particles were when they last were not calm [m], and for how many steps they have
-    /// been near there.
-    calm_places: Vec<Vec4>,
-    calm_steps: u32,
+    calm: Calm,
     frozen: usize,
     pool: Option<rayon::ThreadPool>,
 }
@@ -92,33 +85,32 @@ impl Simulation {
             .sum();
         let mass_kg: f64 = setup.masses_kg.iter().map(|&mass| f64::from(mass)).sum();
         let particles = Particles::new(&mesh.particles, &inverse_masses(&setup));
+        let size_m = (high - low).max_element();
         let rest_volume_m3 = particles.volume_and_inverted(&sound_tets).0;
         // The edge of a regular tetrahedron of the mean volume.
         let mean_volume = rest_volume_m3 / sound.len().max(1) as f64;
         let mut simulation = Self {
             model: Model::new(params.method, mesh, &sound, &setup.fill, &particles.places),
-            particles,
             tools: Tools::default(),
             positions: mesh.particles.clone(),
             points: vec![Vec3::ZERO; setup.embedding.particles.len()],
             point_volumes: Vec::new(),
             point_bounds: (Vec3::ZERO, Vec3::ZERO),
             report: StepReport::default(),
-            calm_places: Vec::new(),
-            calm_steps: 0,
+            calm: Calm::new(&particles, size_m),
             frozen: 0,
             pool: None,
-            size_m: (high - low).max_element(),
+            size_m,
             density_kg_m3: (mass_kg / tissue_m3.max(f64::MIN_POSITIVE)) as f32,
             edge_m: (mean_volume * 72.0_f64.sqrt()).cbrt() as f32,
             rest_volume_m3,
             beating: None,
+            particles,
             sound,
             sound_tets,
             solver: params,
             setup,
         };
-        simulation.calm_places = simulation.particles.places.clone();
         simulation.publish(&Team::alone());
         simulation
     }
@@ -164,6 +156,7 @@ impl Simulation {
             self.model = self.new_model();
         }
         self.solver = params;
+        self.calm.forget_trembling();
         self.wake();
     }
 
@@ -222,6 +215,7 @@ impl Simulation {
             self.model.shorten(0.0);
         }
         self.model.forget(&mut self.particles.places, &self.solver);
+        self.calm.forget_trembling();
         self.wake();
         self.publish(&Team::alone());
     }
@@ -356,13 +350,20 @@ impl Simulation {
         matches!(&self.model, Model::NeoHookean(model) if model.sags())
     }
 
+    /// Whether some of the body has gone back and forth from substep to substep for half a second, as poor tetrahedra
+    /// can with `xpbd-neo-hookean`.
+    pub fn trembles(&self) -> bool {
+        matches!(self.model, Model::NeoHookean(_)) && self.calm.trembles(self.solver.timestep_s)
+    }
+
     /// Volume of the shapes that the tetrahedra want now [m³].
     fn rest_volume_now_m3(&self) -> f64 {
         self.rest_volume_m3 - self.beating.as_ref().map_or(0.0, Beating::lost_m3)
     }
 
-    fn wake(&mut self) {
-        self.calm_steps = 0;
+    /// Has the body move on by itself again, and gives it all its time to fall asleep.
+    pub fn wake(&mut self) {
+        self.calm.wake();
         self.report.asleep = false;
     }
 
@@ -400,24 +401,20 @@ impl Simulation {
             self.move_on(&Team::alone())
         };
         let speed_max_m_s = self.particles.speed_max_m_s();
-        // By the way and not the speed: where something presses, light particles tremble by less. A tremble of two
-        // substeps is back where it was as a step ends, so the way of a substep counts too. A body that is led back
-        // rests nowhere, though a load may hold it still: its own material is yet to answer.
-        let way_max_m = CALM_SIZES * self.size_m;
-        let goes = speed_max_m_s * self.solver.substep_s() > way_max_m
-            || self.particles.farthest_m(&self.calm_places) > way_max_m;
         let beats = self.beating.as_ref().is_some_and(Beating::works);
-        if stirred || beats || goes || self.model.is_restoring() {
-            self.calm_places.copy_from_slice(&self.particles.places);
-            self.calm_steps = 0;
-        } else {
-            self.calm_steps += 1;
+        // A body that is led back rests nowhere, though a load may hold it still: its own material is yet to answer.
+        let stirred = stirred || beats || self.model.is_restoring();
+        let forces_n = self.tools.forces_n(self.solver.substeps);
+        if forces_n.iter().any(|force_n| *force_n != Vec3::ZERO) {
+            // Light particles between a tool and the tissue rattle, and that passes with the tool.
+            self.calm.forget_trembling();
         }
+        (self.calm).watch(&self.particles, self.solver.substep_s(), stirred);
         let surface = surface(&self.setup, &self.points, self.point_bounds);
         self.report = StepReport {
             residual_rms: standing.residual_rms,
             volume_drift: (standing.volume_m3 / self.rest_volume_now_m3() - 1.0) as f32,
-            tool_forces_n: self.tools.forces_n(self.solver.substeps),
+            tool_forces_n: forces_n,
             penetration_max_m: (self.tools).penetration_max_m(surface, &self.particles),
             inverted_tets: standing.inverted_tets,
             frozen_particles: self.frozen,
@@ -426,7 +423,7 @@ impl Simulation {
             yielding_tools: self.tools.yielding(),
             asleep: false,
         };
-        if self.calm_steps >= (CALM_S / self.solver.timestep_s).round() as u32 {
+        if self.calm.may_sleep(self.solver.timestep_s) {
             self.particles.velocities.fill(Vec3::ZERO);
             self.model.stand_still();
             self.report.asleep = true;
@@ -437,6 +434,9 @@ impl Simulation {
     /// All substeps, and how the body stands after them.
     fn move_on(&mut self, team: &Team) -> Standing {
         for substep in 0..self.solver.substeps {
+            if substep + 1 == self.solver.substeps {
+                self.calm.before_last_substep(&self.particles);
+            }
             self.substep(team, substep);
         }
         if let Some(beating) = &mut self.beating {

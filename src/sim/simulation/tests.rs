@@ -92,7 +92,7 @@ fn body_at_rest_stays_at_rest_without_gravity() {
     for method in Method::ALL {
         let mut simulation = Simulation::new(ball(0.05, 0.012), soft(method));
         for _ in 0..200 {
-            simulation.calm_steps = 0; // Kept awake: the constraints must do it.
+            simulation.wake(); // Kept awake: the constraints must do it.
             simulation.step(&[]);
         }
         // 1e-6 of the body's length.

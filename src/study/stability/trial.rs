@@ -124,6 +124,8 @@ impl<'a> Watched<'a> {
     }
 
     fn step(&mut self, tools: &[ToolInput]) {
+        // Asleep it would be still whatever it did before.
+        self.simulation.wake();
         let clock = Clock::start();
         let frozen = self.simulation.step(tools).frozen_particles;
         self.times.add(clock);
