@@ -8,7 +8,9 @@ use crate::geom::paint::OwnPictures;
 use crate::geom::ray::nearest_point;
 use crate::passes::tools::DrawnTool;
 use crate::scene::{BeatSection, MarkerSection, RestBox, Scene};
-use crate::sim::{Method, Simulation, SolverParams, StepReport, ToolAction, ToolInput, ToolShape};
+use crate::sim::{
+    HandOver, Method, Simulation, SolverParams, StepReport, ToolAction, ToolInput, ToolShape,
+};
 use glam::{DVec3, Vec3};
 use sha2::{Digest, Sha256};
 use std::time::Instant;
@@ -79,7 +81,7 @@ impl Session {
             .collect::<Result<_, _>>()?;
         let mut simulation = Simulation::new(setup, scene.solver);
         simulation.set_threads(Some(threads));
-        let is_handed = hand_over_if_stiff(&mut simulation);
+        let is_handed = HandOver::at_start(&mut simulation).is_some();
         simulation.set_beat(BeatSection::beat(scene.body.beat.as_ref()));
         let mut notes = notes;
         notes.extend(solver_notes(&scene, &simulation));
@@ -105,13 +107,8 @@ impl Session {
         let tools = self.tools_now();
         let start = Instant::now();
         let report = self.simulation.step(&tools);
-        if self.simulation.sags() && hand_over_if_stiff(&mut self.simulation) {
-            self.note_hand_over("waves grew in the tissue, which is too stiff for");
-        } else if self.simulation.trembles() {
-            hand_over(&mut self.simulation);
-            self.note_hand_over(
-                "some of the tissue had trembled for half a second, as poor tetrahedra do by",
-            );
+        if let Some(cause) = HandOver::after_step(&mut self.simulation) {
+            self.note_hand_over(cause);
         }
         Tick {
             report,
@@ -120,8 +117,15 @@ impl Session {
         }
     }
 
-    /// Says once `why` the body was handed over, and what is done from here on.
-    fn note_hand_over(&mut self, why: &str) {
+    /// Says once why the body was handed over, and what is done from here on.
+    fn note_hand_over(&mut self, cause: HandOver) {
+        let why = match cause {
+            HandOver::TooStiff => "the tissue was too stiff for",
+            HandOver::WavesGrew => "waves grew in the tissue, which is too stiff for",
+            HandOver::Trembled => {
+                "some of the tissue had trembled for half a second, as poor tetrahedra do by"
+            }
+        };
         self.handed_over_frame = Some(self.frame);
         let taken = self.solver();
         let note = format!(
@@ -193,7 +197,8 @@ impl Session {
         self.simulation
             .set_gravity_and_damping(body.gravity_m_s2, body.damping_per_s);
         self.simulation.set_params(self.scene.solver);
-        self.handed_over_frame = hand_over_if_stiff(&mut self.simulation).then_some(self.frame);
+        let cause = HandOver::at_start(&mut self.simulation);
+        self.handed_over_frame = cause.map(|_| self.frame);
     }
 
     /// Takes over a changed heartbeat.
@@ -259,29 +264,6 @@ impl Session {
             .iter()
             .map(|marker| (marker, mean(&marker.points, self.points())))
     }
-}
-
-/// Substeps of `implicit` for a body that it is handed: the swing is then within 0.2 %, and fast tools stay out.
-const HANDED_SUBSTEPS_MAX: u32 = 4;
-
-/// Hands a body to `implicit` where `xpbd-neo-hookean` would need more substeps than it has to be as stiff as it is
-/// said to be, and says whether it did. More substeps would do as well, but cost more, and slivers tremble with some
-/// numbers of them.
-fn hand_over_if_stiff(simulation: &mut Simulation) -> bool {
-    let stiff = simulation.faithful_substeps().is_some();
-    if stiff {
-        hand_over(simulation);
-    }
-    stiff
-}
-
-fn hand_over(simulation: &mut Simulation) {
-    let asked = simulation.params();
-    simulation.set_params(SolverParams {
-        method: Method::Implicit,
-        substeps: asked.substeps.min(HANDED_SUBSTEPS_MAX),
-        ..asked
-    });
 }
 
 /// "1 substep", "4 substeps".

@@ -12,6 +12,7 @@ pub mod constraint;
 mod contact;
 pub mod diagnose;
 mod grab;
+mod hand_over;
 mod handle;
 mod implicit;
 mod lanes;
@@ -27,6 +28,7 @@ mod team;
 mod tools;
 
 pub use beat::Beat;
+pub use hand_over::HandOver;
 pub use simulation::Simulation;
 
 use crate::geom::{Embedding, TetMesh, bounds};

@@ -5,6 +5,7 @@
 //! where it was, and parts join to the very result of one run. To add a study, write its `Sweep` in
 //! a file of its own and give it a place in [`Study`].
 
+mod contender;
 mod document;
 mod findings;
 mod held_body;

@@ -1,5 +1,6 @@
 //! One cell: the body settles, swings, and is timed.
 
+use super::super::contender::Contender;
 use super::super::held_body::HeldBody;
 use super::super::oracle::Oracle;
 use super::super::sweep::{Cost, Row, State, Verdict, finite};
@@ -7,8 +8,8 @@ use super::super::timing::{Clock, Times};
 use super::Cell;
 use super::limit::Limit;
 use crate::measure::chart::number;
+use crate::sim::Simulation;
 use crate::sim::diagnose::volume_and_inverted;
-use crate::sim::{Simulation, SolverParams};
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -78,19 +79,23 @@ pub fn row(
     threads: usize,
 ) -> Row<Cell, Measures> {
     let mut simulation = Simulation::new(body.setup.clone(), cell.params());
+    cell.method.start(&mut simulation, cell.params());
     simulation.set_threads(Some(1));
     let swing_frames = if oracle.swing_m.is_empty() {
         TIMED_FRAMES
     } else {
         SWING_FRAMES
     };
-    let swung = swing(&mut simulation, body, swing_frames);
+    let swung = swing(&mut simulation, cell.method, body, swing_frames);
     let two_threads = (threads >= 2).then(|| {
         simulation.reset();
+        cell.method.start(&mut simulation, cell.params());
         simulation.set_threads(Some(2));
-        swing(&mut simulation, body, TIMED_FRAMES).times.wall()
+        swing(&mut simulation, cell.method, body, TIMED_FRAMES)
+            .times
+            .wall()
     });
-    let settled = settle(body, cell.params());
+    let settled = settle(body, cell);
     let oracle_tip_m = body.tip_of_oracle_m(&oracle.settled_m).z;
     let ours = Swings::of(&swung.tip_m);
     let theirs = Swings::of(&oracle.swing_m);
@@ -153,15 +158,17 @@ impl Settled {
     }
 }
 
-fn settle(body: &HeldBody, params: SolverParams) -> Settled {
+fn settle(body: &HeldBody, cell: &Cell) -> Settled {
     let mut setup = body.setup.clone();
     setup.damping_per_s = SETTLE_DAMPING_PER_S;
-    let mut simulation = Simulation::new(setup, params);
+    let mut simulation = Simulation::new(setup, cell.params());
+    cell.method.start(&mut simulation, cell.params());
     simulation.set_threads(Some(1));
     for _ in 0..SETTLE_FRAMES {
         // Asleep it would be still whatever it did before.
         simulation.wake();
         simulation.step(&[]);
+        cell.method.after_step(&mut simulation);
     }
     let report = simulation.report();
     let positions = simulation.particles().to_vec();
@@ -191,7 +198,12 @@ impl Swung {
     }
 }
 
-fn swing(simulation: &mut Simulation, body: &HeldBody, frames: usize) -> Swung {
+fn swing(
+    simulation: &mut Simulation,
+    contender: Contender,
+    body: &HeldBody,
+    frames: usize,
+) -> Swung {
     let mut tip_m = vec![body.tip_m(simulation.particles()).z];
     let mut times = Times::default();
     let mut farthest = 0.0_f64;
@@ -200,6 +212,7 @@ fn swing(simulation: &mut Simulation, body: &HeldBody, frames: usize) -> Swung {
         simulation.wake();
         let clock = Clock::start();
         simulation.step(&[]);
+        contender.after_step(simulation);
         if frame >= WARM_UP_FRAMES {
             times.add(clock);
         }

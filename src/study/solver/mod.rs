@@ -13,13 +13,14 @@ pub use measure::Measures;
 use limit::Limit;
 
 use super::Study;
+use super::contender::Contender;
 use super::findings::Findings;
-use super::held_body::{HeldBody, Hold, beam};
+use super::held_body::{HeldBody, Hold, beam, organ};
 use super::oracle::{Motion, Oracle, Tissue};
 use super::sweep::{Row, Sweep};
 use crate::app::AppError;
 use crate::geom::import::read_tets;
-use crate::sim::{Method, SolverParams};
+use crate::sim::SolverParams;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -46,10 +47,12 @@ pub struct Plan {
 pub struct BodyPlan {
     /// Lattice cells across the beam: 5, 10 and 17 give 1k, 10k and 50k tetrahedra.
     pub cells_across: Vec<u32>,
-    /// Instead of the beams, the tetrahedra of a Gmsh file.
+    /// Cells of the cube that is blown up to an organ of poor tetrahedra, held by its foot: 10 gives 5k.
+    pub organ_cells: Vec<u32>,
+    /// Instead of all these, the tetrahedra of a Gmsh file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
-    /// Where the body is held.
+    /// Where a beam or the body of the file is held.
     pub hold: Hold,
     pub density_kg_m3: f64,
 }
@@ -58,7 +61,7 @@ pub struct BodyPlan {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolverPlan {
-    pub method: Vec<Method>,
+    pub method: Vec<Contender>,
     pub substeps: Vec<u32>,
     pub iterations: Vec<u32>,
     pub youngs_modulus_pa: Vec<f64>,
@@ -69,10 +72,12 @@ pub struct SolverPlan {
 /// One setting on one body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
-    pub method: Method,
+    pub method: Contender,
     pub mesh: String,
-    /// Of a beam; null for a file.
+    /// Of a beam; null for others.
     pub cells_across: Option<u32>,
+    /// Of an organ; null for others.
+    pub organ_cells: Option<u32>,
     pub hold: Hold,
     pub density_kg_m3: f64,
     pub youngs_modulus_pa: f64,
@@ -85,7 +90,7 @@ pub struct Cell {
 impl Cell {
     fn params(&self) -> SolverParams {
         SolverParams {
-            method: self.method,
+            method: self.method.method(),
             timestep_s: self.timestep_s as f32,
             substeps: self.substeps,
             iterations: self.iterations,
@@ -118,10 +123,10 @@ impl Cell {
     fn is_worthwhile(&self) -> bool {
         // Forces of springs are not iterated, and many iterations of a few substeps are the slow
         // way to the same work.
-        let iterates = self.method != Method::MassSpring;
+        let iterates = self.method != Contender::MassSpring;
         let few = self.substeps * self.iterations <= SWEEPS_MAX;
         let small = self.iterations == 1 || (iterates && few && !self.is_large());
-        if self.method == Method::Implicit && self.is_large() {
+        if self.method == Contender::Implicit && self.is_large() {
             return self.substeps <= 4 && self.iterations <= 2;
         }
         let worth_the_time = self.substeps >= 10 || !self.is_large();
@@ -129,21 +134,49 @@ impl Cell {
     }
 }
 
-/// The beams of a plan, or the body of its file: names and cells across.
-fn meshes(body: &BodyPlan) -> Vec<(String, Option<u32>)> {
-    match &body.file {
-        Some(file) => {
-            let stem = file.file_stem().unwrap_or(file.as_os_str());
-            vec![(stem.to_string_lossy().into_owned(), None)]
-        }
-        None => (body.cells_across.iter())
-            .map(|&n| (mesh_name(n), Some(n)))
-            .collect(),
+/// A body of a plan.
+struct Mesh {
+    name: String,
+    cells_across: Option<u32>,
+    organ_cells: Option<u32>,
+    hold: Hold,
+}
+
+/// The beams and organs of a plan, or the body of its file.
+fn meshes(body: &BodyPlan) -> Vec<Mesh> {
+    if let Some(file) = &body.file {
+        let stem = file.file_stem().unwrap_or(file.as_os_str());
+        return vec![Mesh {
+            name: stem.to_string_lossy().into_owned(),
+            cells_across: None,
+            organ_cells: None,
+            hold: body.hold,
+        }];
+    }
+    let beams = body.cells_across.iter().map(|&n| Mesh {
+        name: beam_name(n),
+        cells_across: Some(n),
+        organ_cells: None,
+        hold: body.hold,
+    });
+    let organs = body.organ_cells.iter().map(|&n| Mesh {
+        name: organ_name(n),
+        cells_across: None,
+        organ_cells: Some(n),
+        hold: Hold::Foot,
+    });
+    beams.chain(organs).collect()
+}
+
+fn organ_name(cells: u32) -> String {
+    match cells {
+        10 => "organ-5k".to_owned(),
+        other => format!("organ-{}", 5 * u64::from(other).pow(3)),
     }
 }
 
 /// `1250` as `1k`.
-fn mesh_name(cells_across: u32) -> String {
+fn beam_name(cells_across: u32) -> String {
     match cells_across {
         5 => "beam-1k".to_owned(),
         10 => "beam-10k".to_owned(),
@@ -176,16 +209,18 @@ impl Sweep for Solver {
 
     fn plan(quick: bool) -> Plan {
         let full = !quick;
+        let organ_cells = if full { vec![10] } else { Vec::new() };
         let pick = |all: &[u32], few: &[u32]| if full { all.to_vec() } else { few.to_vec() };
         Plan {
             body: BodyPlan {
                 cells_across: pick(&[5, 10, 17], &[5]),
+                organ_cells,
                 file: None,
                 hold: Hold::End,
                 density_kg_m3: 1000.0,
             },
             solver: SolverPlan {
-                method: Method::ALL.to_vec(),
+                method: Contender::ALL.to_vec(),
                 substeps: pick(&[1, 2, 4, 5, 10, 20, 40], &[1, 5, 20]),
                 iterations: pick(&[1, 2, 4, 10, 20], &[1]),
                 youngs_modulus_pa: if full { vec![1e4, 5e4] } else { vec![1e4] },
@@ -197,10 +232,15 @@ impl Sweep for Solver {
 
     fn cells(plan: &Plan) -> Result<Vec<Cell>, String> {
         let (body, solver) = (&plan.body, &plan.solver);
-        if let Some(across) = (body.cells_across.iter()).find(|n| !(1..=50).contains(*n)) {
-            return Err(format!(
-                "body.cells_across = {across} is out of range: choose from 1 to 50"
-            ));
+        for (key, cells) in [
+            ("cells_across", &body.cells_across),
+            ("organ_cells", &body.organ_cells),
+        ] {
+            if let Some(n) = cells.iter().find(|n| !(1..=50).contains(*n)) {
+                return Err(format!(
+                    "body.{key} = {n} is out of range: choose from 1 to 50"
+                ));
+            }
         }
         if !(1.0..=30_000.0).contains(&body.density_kg_m3) {
             return Err(format!(
@@ -209,16 +249,17 @@ impl Sweep for Solver {
             ));
         }
         let mut cells = Vec::new();
-        for (mesh, cells_across) in meshes(body) {
+        for mesh in meshes(body) {
             for &youngs_modulus_pa in &solver.youngs_modulus_pa {
                 for &method in &solver.method {
                     for &substeps in &solver.substeps {
                         for &iterations in &solver.iterations {
                             cells.push(Cell {
                                 method,
-                                mesh: mesh.clone(),
-                                cells_across,
-                                hold: body.hold,
+                                mesh: mesh.name.clone(),
+                                cells_across: mesh.cells_across,
+                                organ_cells: mesh.organ_cells,
+                                hold: mesh.hold,
                                 density_kg_m3: body.density_kg_m3,
                                 youngs_modulus_pa,
                                 poisson_ratio: solver.poisson_ratio,
@@ -259,9 +300,10 @@ impl Sweep for Solver {
             let motion = cell.motion(body.setup.tets.tets.len());
             Oracle::kept(&file, &body, cell.tissue(), motion)
         })?;
+        // A method has the same limit whoever takes it.
         let limit = shared(
             &self.limits,
-            format!("{tissue}-{}", cell.method.name()),
+            format!("{tissue}-{}", cell.method.method().name()),
             || Ok(Limit::of(&body, cell.params(), cell.timestep_s)),
         )?;
         Ok(measure::row(cell, &body, &oracle, *limit, self.threads))
@@ -274,16 +316,17 @@ impl Sweep for Solver {
 
 impl Solver {
     fn body(&self, cell: &Cell) -> Result<HeldBody, AppError> {
-        let tets = match (&self.file, cell.cells_across) {
-            (None, Some(cells_across)) => beam(cells_across),
-            (Some(file), _) => {
+        let tets = match (&self.file, cell.cells_across, cell.organ_cells) {
+            (None, Some(cells_across), _) => beam(cells_across),
+            (None, None, Some(cells)) => organ(cells as usize),
+            (Some(file), ..) => {
                 let imported = read_tets(file)?;
                 for note in imported.notes {
                     eprintln!("{}: {note}", file.display());
                 }
                 imported.mesh
             }
-            (None, None) => unreachable!("a plan without a file has beams"),
+            (None, None, None) => unreachable!("a plan without a file has beams and organs"),
         };
         let body = HeldBody::new(tets, cell.density_kg_m3 as f32, cell.hold);
         let refuse = |problem: &str| Err(AppError::Body(format!("{}: {problem}", cell.mesh)));
@@ -330,7 +373,7 @@ mod tests {
             "{large} of {}",
             cells.len()
         );
-        let iterated = |cell: &&Cell| cell.method == Method::MassSpring && cell.iterations > 1;
+        let iterated = |cell: &&Cell| cell.method == Contender::MassSpring && cell.iterations > 1;
         assert_eq!(cells.iter().filter(iterated).count(), 0);
     }
 

@@ -1,5 +1,6 @@
 //! Tables, charts and text of the study, from its rows alone.
 
+use super::super::contender::Contender;
 use super::super::findings::Findings;
 use super::super::peers::{Peer, peers};
 use super::super::sweep::Row;
@@ -7,7 +8,7 @@ use super::{Cell, Measures};
 use crate::measure::chart::{number, three_digits};
 use crate::measure::page::{Block, Table};
 use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
-use crate::sim::{Method, SolverParams};
+use crate::sim::SolverParams;
 
 type SolverRow = Row<Cell, Measures>;
 
@@ -128,11 +129,11 @@ fn lead(bodies: &[Body]) -> String {
     let is_default = |row: &&&SolverRow| {
         let cell = &row.cell;
         (cell.method, cell.substeps, cell.iterations)
-            == (default.method, default.substeps, default.iterations)
+            == (Contender::AsAScene, default.substeps, default.iterations)
     };
     let mut text = format!(
         "Settled and swinging beams against a Newton solve and an implicit midpoint motion of the same \
-         mesh in double precision. The default setting, {} {}×{}:",
+         mesh in double precision. The default setting, {} {}×{} as a scene runs it:",
         default.method.name(),
         default.substeps,
         default.iterations
@@ -216,7 +217,7 @@ fn chart(
     peer_error: &dyn Fn(&Peer) -> Option<f64>,
 ) -> ScatterChart {
     let mut clouds = Vec::new();
-    for (look, method) in Method::ALL.into_iter().enumerate() {
+    for (look, method) in Contender::ALL.into_iter().enumerate() {
         let of_method = body.rows.iter().filter(|row| row.cell.method == method);
         let (single, more): (Vec<&SolverRow>, Vec<&SolverRow>) =
             of_method.partition(|row| row.cell.iterations == 1);
@@ -260,7 +261,7 @@ fn chart(
     if !others.is_empty() {
         clouds.push(Cloud {
             label: "other programs".to_owned(),
-            look: 3,
+            look: Contender::ALL.len(),
             hollow: true,
             joined: false,
             points: others,
@@ -402,6 +403,9 @@ fn limits(rows: &[SolverRow]) -> Table {
         let Some(found) = row.measures.stable_substep_s else {
             continue;
         };
+        if row.cell.method == Contender::AsAScene {
+            continue;
+        }
         let estimate = row.measures.stable_substep_estimate_s;
         let line = vec![
             row.cell.mesh.clone(),

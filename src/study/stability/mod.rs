@@ -11,14 +11,15 @@ mod trial;
 pub use trial::Measures;
 
 use super::Study;
+use super::contender::Contender;
 use super::findings::Findings;
 use super::held_body::{HeldBody, Hold, beam, organ, scaled, with_sliver};
 use super::oracle::{self, Tissue};
 use super::sweep::{Row, Sweep};
 use crate::app::AppError;
 use crate::geom::TetMesh;
+use crate::sim::SolverParams;
 use crate::sim::diagnose::volume_and_inverted;
-use crate::sim::{Method, SolverParams};
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -51,7 +52,7 @@ pub struct BodyPlan {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolverPlan {
-    pub method: Vec<Method>,
+    pub method: Vec<Contender>,
     pub youngs_modulus_pa: Vec<f64>,
     pub poisson_ratio: Vec<f64>,
     pub timestep_s: Vec<f64>,
@@ -66,7 +67,7 @@ pub struct ToolPlan {
     pub speed_m_s: Vec<f64>,
 }
 
-/// The bodies there are, of about a thousand tetrahedra.
+/// The bodies there are, all but one of about a thousand tetrahedra.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mesh {
@@ -76,18 +77,28 @@ pub enum Mesh {
     Sliver,
     /// An ellipsoid of 12 × 8 × 6 cm with poor tetrahedra.
     Organ,
+    /// The same of five thousand tetrahedra, the poorest much poorer.
+    #[serde(rename = "organ-5k")]
+    Organ5k,
     /// The beam a tenth as large: tetrahedra of a millimetre.
     Millimetre,
 }
 
 impl Mesh {
-    const ALL: [Self; 4] = [Self::Regular, Self::Sliver, Self::Organ, Self::Millimetre];
+    const ALL: [Self; 5] = [
+        Self::Regular,
+        Self::Sliver,
+        Self::Organ,
+        Self::Organ5k,
+        Self::Millimetre,
+    ];
 
     fn name(self) -> &'static str {
         match self {
             Self::Regular => "regular",
             Self::Sliver => "sliver",
             Self::Organ => "organ",
+            Self::Organ5k => "organ-5k",
             Self::Millimetre => "millimetre",
         }
     }
@@ -97,6 +108,7 @@ impl Mesh {
             Self::Regular => beam(5),
             Self::Sliver => with_sliver(beam(5), 1e-3),
             Self::Organ => organ(6),
+            Self::Organ5k => organ(10),
             Self::Millimetre => scaled(beam(5), 0.1),
         }
     }
@@ -105,7 +117,7 @@ impl Mesh {
     fn hold(self) -> Hold {
         match self {
             Self::Regular | Self::Sliver | Self::Millimetre => Hold::End,
-            Self::Organ => Hold::Foot,
+            Self::Organ | Self::Organ5k => Hold::Foot,
         }
     }
 }
@@ -149,7 +161,7 @@ impl Start {
 /// One setting of all knobs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
-    pub method: Method,
+    pub method: Contender,
     pub mesh: Mesh,
     pub youngs_modulus_pa: f64,
     pub poisson_ratio: f64,
@@ -175,7 +187,7 @@ enum Kind {
 impl Cell {
     fn params(&self) -> SolverParams {
         SolverParams {
-            method: self.method,
+            method: self.method.method(),
             timestep_s: self.timestep_s as f32,
             substeps: self.substeps,
             iterations: self.iterations,
@@ -240,7 +252,7 @@ impl Sweep for Stability {
                     seeds: 2,
                 },
                 solver: SolverPlan {
-                    method: Method::ALL.to_vec(),
+                    method: Contender::ALL.to_vec(),
                     youngs_modulus_pa: vec![1e3, 1e4, 1e6],
                     poisson_ratio: vec![0.45],
                     timestep_s: vec![1.0 / 60.0],
@@ -258,7 +270,7 @@ impl Sweep for Stability {
                 seeds: 20,
             },
             solver: SolverPlan {
-                method: Method::ALL.to_vec(),
+                method: Contender::ALL.to_vec(),
                 youngs_modulus_pa: vec![1e3, 1e4, 1e5, 1e6, 1e7],
                 poisson_ratio: vec![0.0, 0.3, 0.45, 0.49],
                 timestep_s: vec![1.0 / 30.0, 1.0 / 60.0, 1.0 / 120.0],
@@ -355,7 +367,6 @@ impl Stability {
 /// The cells of a plan; see the head of this file.
 fn cells(plan: &Plan) -> Vec<Cell> {
     let (body, solver) = (&plan.body, &plan.solver);
-    let default = SolverParams::default();
     let base = base(plan);
     let mut cells = vec![base.clone()];
     over(&mut cells, &solver.method, |cell, value| {
@@ -382,7 +393,7 @@ fn cells(plan: &Plan) -> Vec<Cell> {
     cells
         .into_iter()
         .flat_map(|cell| {
-            let is_seeded = cell.method == default.method
+            let is_seeded = cell.method == Contender::AsAScene
                 && cell.start == Start::Random
                 && departures(&cell, &base) == 1;
             let seeds = if is_seeded { body.seeds.max(1) } else { 1 };
@@ -399,7 +410,7 @@ fn base(plan: &Plan) -> Cell {
     let (body, solver) = (&plan.body, &plan.solver);
     let default = SolverParams::default();
     Cell {
-        method: default.method,
+        method: Contender::AsAScene,
         mesh: or_first(&body.mesh, Mesh::Regular),
         youngs_modulus_pa: or_first(&solver.youngs_modulus_pa, 1e4),
         poisson_ratio: or_first(&solver.poisson_ratio, 0.45),
@@ -488,7 +499,7 @@ mod tests {
                 }
             }
         }
-        let default = SolverParams::default().method;
+        let default = Contender::AsAScene;
         let random = |c: &&Cell| c.method == default && c.start == Start::Random && c.seed > 0;
         assert_eq!(cells.iter().filter(random).count(), 19);
     }

@@ -1,5 +1,6 @@
 //! What is done to one body: it hangs, it is wrecked, or it is poked.
 
+use super::super::contender::Contender;
 use super::super::held_body::{GRAVITY_M_S2, HeldBody};
 use super::super::random::Random;
 use super::super::sweep::{Cost, Row, finite};
@@ -98,6 +99,7 @@ impl Cell {
 /// A body under way, watched.
 struct Watched<'a> {
     body: &'a HeldBody,
+    contender: Contender,
     simulation: Simulation,
     times: Times,
     frame: u32,
@@ -111,10 +113,12 @@ impl<'a> Watched<'a> {
         setup.gravity_m_s2 = gravity_m_s2;
         setup.damping_per_s = damping_per_s;
         let mut simulation = Simulation::new(setup, cell.params());
+        cell.method.start(&mut simulation, cell.params());
         // Cells are measured side by side, each on a thread.
         simulation.set_threads(Some(1));
         Self {
             body,
+            contender: cell.method,
             simulation,
             times: Times::default(),
             frame: 0,
@@ -128,6 +132,7 @@ impl<'a> Watched<'a> {
         self.simulation.wake();
         let clock = Clock::start();
         let frozen = self.simulation.step(tools).frozen_particles;
+        self.contender.after_step(&mut self.simulation);
         self.times.add(clock);
         self.frame += 1;
         if frozen > 0 {
@@ -368,14 +373,13 @@ pub fn is_inside(positions: &[Vec3], tets: &[[u32; 4]], place: DVec3) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::Method;
     use crate::study::held_body::{Hold, beam};
     use crate::study::stability::Mesh;
     use crate::study::sweep::State;
 
     fn cell() -> Cell {
         Cell {
-            method: Method::XpbdNeoHookean,
+            method: Contender::XpbdNeoHookean,
             mesh: Mesh::Regular,
             youngs_modulus_pa: 1e4,
             poisson_ratio: 0.45,
@@ -425,7 +429,7 @@ mod tests {
     #[test]
     fn springs_with_too_long_a_substep_fail() {
         let explosive = Cell {
-            method: Method::MassSpring,
+            method: Contender::MassSpring,
             youngs_modulus_pa: 1e6,
             substeps: 1,
             ..cell()
