@@ -137,6 +137,61 @@ fn meetings() -> impl Strategy<Value = Meeting> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
     #[test]
+    fn gap_falls_by_its_gradient(
+        corners in prop::array::uniform3(prop::array::uniform3(-0.05_f32..0.05).prop_map(Vec3::from)),
+        axis in prop::array::uniform3(-0.03_f32..0.03).prop_map(Vec3::from),
+    ) {
+        const STEP_M: f32 = 1e-4;
+        let axis = [Vec3::ZERO, axis];
+        let distance_m = |corners| nearest(axis, corners).distance_m();
+        let near = nearest(axis, corners);
+        // Nearer, rounding and the curvature of the distance are no longer small.
+        prop_assume!(near.distance_m() > 0.01);
+        let normal = near.normal(corners);
+        for corner in 0..3 {
+            for way in [Vec3::X, Vec3::Y, Vec3::Z] {
+                let (mut ahead, mut behind) = (corners, corners);
+                ahead[corner] += STEP_M * way;
+                behind[corner] -= STEP_M * way;
+                // Where edges are all but parallel to the axis the nearest place jumps: no gradient there.
+                let jumps = nearest(axis, ahead).weights.distance(nearest(axis, behind).weights);
+                if jumps > 0.1 {
+                    continue;
+                }
+                let slope = (distance_m(ahead) - distance_m(behind)) / (2.0 * STEP_M);
+                let exact = near.weights[corner] * normal.dot(way);
+                prop_assert!((slope - exact).abs() < 0.01, "{slope}, not {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn gap_and_slip_of_a_touch_follow_each_particle_by_their_gradients(meeting in meetings()) {
+        const STEP_M: f32 = 1e-3;
+        let outcome = meeting.solve(1e-3);
+        let places: Vec<Vec4> = outcome.end.iter().map(|x| x.extend(1.0 / MASS_KG)).collect();
+        for touch in &outcome.touches {
+            for (particle, weight) in touch.handle.carriers() {
+                for way in [Vec3::X, Vec3::Y, Vec3::Z] {
+                    let moved = |by: f32| {
+                        let mut moved = places.clone();
+                        moved[particle as usize] += (by * way).extend(0.0);
+                        (touch.gap_m(meeting.tool, &moved), touch.slip_m(meeting.tool, &moved))
+                    };
+                    let (ahead, behind) = (moved(STEP_M), moved(-STEP_M));
+                    let gap = (ahead.0 - behind.0) / (2.0 * STEP_M);
+                    let slip = (ahead.1 - behind.1) / (2.0 * STEP_M);
+                    let along = touch.normal.dot(way);
+                    // Places of up to 0.3 m are rounded to 3e-8, over a step of 2e-3.
+                    prop_assert!((gap - weight * along).abs() < 1e-3, "{gap}");
+                    let expected = weight * (way - along * touch.normal);
+                    prop_assert!(slip.distance(expected) < 1e-3, "{slip}, not {expected}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn no_tool_of_any_speed_changes_sides_of_a_face_too_wide_to_be_passed(meeting in meetings()) {
         // Ten times as wide, as far beyond every way.
         let wide = Meeting {
