@@ -8,9 +8,9 @@ use glam::Vec3;
 
 /// Contact is declared this share of the radius early.
 const EARLY_RADII: f32 = 1e-3;
-/// Most triangles need a handful of advances; one that turns as it grazes the tool needs hundreds, since each gets it
-/// nearer by a share only.
-const ADVANCES_MAX: u32 = 10_000;
+/// Most triangles need a handful of advances; one that turns as it grazes the tool needs a hundred and more, since each
+/// gets it nearer by a share only.
+const ADVANCES_MAX: u32 = 1_000;
 
 /// A place of a triangle that comes to a tool.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,13 +31,16 @@ pub struct Hit {
 /// the first contact; where it gets no further, it says that there is one.
 pub fn sweep(axis: Axis, radius_m: f32, start: [Vec3; 3], end: [Vec3; 3]) -> Option<Hit> {
     let at = |time: f32| -> [Vec3; 3] { std::array::from_fn(|k| start[k].lerp(end[k], time)) };
-    let mut time = 0.0_f32;
+    let way_m = (0..3).map(|k| start[k].distance(end[k])).fold(0.0, f32::max);
+    let (mut time, mut last) = (0.0_f32, -1.0);
     let mut advances = 0;
     loop {
         let triangle = at(time);
         let near = nearest(axis, triangle);
         let normal = near.normal(triangle);
-        if near.distance_m() <= (1.0 + EARLY_RADII) * radius_m || advances == ADVANCES_MAX {
+        let gets_no_further = advances == ADVANCES_MAX || time == last;
+        last = time;
+        if near.distance_m() <= (1.0 + EARLY_RADII) * radius_m || gets_no_further {
             return Some(Hit {
                 normal,
                 foot: near.foot,
@@ -52,7 +55,8 @@ pub fn sweep(axis: Axis, radius_m: f32, start: [Vec3; 3], end: [Vec3; 3]) -> Opt
                 free_for = free_for.min((normal.dot(triangle[k]) - surface) / closing);
             }
         }
-        time += free_for;
+        // No corner goes farther than `way_m`, so neither does the gap close faster.
+        time += free_for.max((near.distance_m() - radius_m) / way_m);
         if time.is_nan() || time > 1.0 {
             return None;
         }

@@ -46,10 +46,30 @@ pub struct SolverPlan {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ToolPlan {
+    pub shape: Vec<Shape>,
     pub speed_m_s: Vec<f64>,
-    /// Simulations for each organ, method and speed, and pokes in each, one after the other.
+    /// Simulations for each organ, method, shape and speed, and pokes in each, one after the other.
     pub batches: u32,
     pub pokes: u32,
+}
+
+/// What pokes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shape {
+    /// A sphere.
+    Ball,
+    /// A capsule of four radii, held along its way: the shaft follows its tip into the tissue.
+    Rod,
+}
+
+impl Shape {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Ball => "ball",
+            Self::Rod => "rod",
+        }
+    }
 }
 
 /// One simulation with its pokes.
@@ -58,6 +78,7 @@ pub struct Cell {
     pub scene: String,
     pub cell_share: f64,
     pub method: Method,
+    pub shape: Shape,
     pub speed_m_s: f64,
     pub batch: u32,
     pub pokes: u32,
@@ -92,8 +113,9 @@ impl Sweep for Pokes {
                 method: vec![SolverParams::default().method],
             },
             tool: ToolPlan {
+                shape: vec![Shape::Ball, Shape::Rod],
                 speed_m_s: vec![0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0],
-                batches: pick(10, 1),
+                batches: pick(5, 1),
                 pokes: pick(48, 10),
             },
         }
@@ -115,16 +137,17 @@ impl Sweep for Pokes {
         let mut cells = Vec::new();
         for scene in &plan.body.scene {
             for &method in &plan.solver.method {
-                for &speed_m_s in speeds {
-                    for batch in 0..plan.tool.batches {
-                        cells.push(Cell {
+                for &shape in &plan.tool.shape {
+                    for &speed_m_s in speeds {
+                        cells.extend((0..plan.tool.batches).map(|batch| Cell {
                             scene: scene.clone(),
                             cell_share: share,
                             method,
+                            shape,
                             speed_m_s,
                             batch,
                             pokes: plan.tool.pokes,
-                        });
+                        }));
                     }
                 }
             }

@@ -3,8 +3,8 @@
 use super::super::random::Random;
 use super::super::sweep::{Cost, Row, State, Verdict, finite};
 use super::super::timing::{Clock, Times};
-use super::Cell;
 use super::depth::depth_m;
+use super::{Cell, Shape};
 use crate::app::{AppError, LoadedBody};
 use crate::geom::ray::first_hit;
 use crate::measure::chart::number;
@@ -31,6 +31,9 @@ const WITHDRAWAL_MIN_M_S: f32 = 0.1;
 /// Places that are tried for one poke.
 const TRIES_MAX: u32 = 1000;
 const FRICTION: f32 = 0.3;
+/// Length of the axis of a rod, in radii, and places on it at which its depth is looked at.
+const ROD_RADII: f32 = 4.0;
+const ROD_LOOKS: u32 = 5;
 /// Share of the thickness from which on a tool is inside: the goal, and what nobody would overlook.
 const PENETRATION_BOUNDS: [f64; 2] = [0.01, 0.1];
 
@@ -63,7 +66,9 @@ pub struct Measures {
 #[derive(Clone, Copy, Debug)]
 struct Poke {
     radius_m: f32,
-    /// Middle of the tool before it touches.
+    /// From the tip to the other end of the tool's axis; zero for a ball.
+    axis_m: Vec3,
+    /// Middle of the tip before it touches.
     from_m: Vec3,
     /// Unit direction of its way.
     direction: Vec3,
@@ -94,7 +99,7 @@ pub fn run(
     };
     let places = Places::new(body, simulation.points());
     for _ in 0..cell.pokes {
-        let poke = places.choose(&mut random).ok_or_else(|| {
+        let poke = places.choose(cell.shape, &mut random).ok_or_else(|| {
             AppError::Body(format!("{}: no place on it can be poked", cell.scene))
         })?;
         let frozen_before = simulation.report().frozen_particles;
@@ -132,10 +137,41 @@ pub fn run(
 /// Another one for every cell, and the same one wherever it is measured.
 fn seed(cell: &Cell) -> u64 {
     // FNV-1a over what tells cells apart, except the method: all methods get the same pokes.
-    let text = format!("{} {} {}", cell.scene, cell.speed_m_s, cell.batch);
+    let text = format!(
+        "{} {} {} {}",
+        cell.scene,
+        cell.shape.name(),
+        cell.speed_m_s,
+        cell.batch
+    );
     text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
     })
+}
+
+impl Poke {
+    fn shape(&self) -> ToolShape {
+        let (radius_m, axis_m) = (self.radius_m, self.axis_m);
+        if axis_m == Vec3::ZERO {
+            ToolShape::Sphere { radius_m }
+        } else {
+            ToolShape::Capsule { radius_m, axis_m }
+        }
+    }
+
+    /// How deep the tool with its tip at `tip_m` reaches into the surface [m], negative where it does not.
+    fn depth_m(&self, tip_m: Vec3, points: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
+        let looks = match self.shape() {
+            ToolShape::Sphere { .. } => 1,
+            ToolShape::Capsule { .. } => ROD_LOOKS,
+        };
+        (0..looks)
+            .map(|look| {
+                let middle = tip_m + (look as f32 / (ROD_LOOKS - 1) as f32) * self.axis_m;
+                depth_m(middle, self.radius_m, points, triangles)
+            })
+            .fold(f64::NEG_INFINITY, f64::max)
+    }
 }
 
 /// What happened during one poke.
@@ -158,9 +194,7 @@ fn poke_once(
     let mut watched = Watched::default();
     let mut step = |simulation: &mut Simulation, way_m: f32, action: ToolAction| {
         let tool = ToolInput {
-            shape: ToolShape::Sphere {
-                radius_m: poke.radius_m,
-            },
+            shape: poke.shape(),
             position_m: poke.from_m + way_m * poke.direction,
             action,
             friction: FRICTION,
@@ -169,8 +203,8 @@ fn poke_once(
         let report = simulation.step(&[tool]);
         times.add(clock);
         if action == ToolAction::Push {
-            let (middle, points) = (tool.position_m, simulation.points());
-            let depth_m = depth_m(middle, poke.radius_m, points, places.triangles);
+            let points = simulation.points();
+            let depth_m = poke.depth_m(tool.position_m, points, places.triangles);
             watched.penetration_m = watched.penetration_m.max(depth_m);
             watched.tunnelled |= depth_m > f64::from(poke.radius_m);
         }
@@ -235,11 +269,11 @@ impl<'a> Places<'a> {
     }
 
     /// A poke at a random place; `None` if no place will do.
-    fn choose(&self, random: &mut Random) -> Option<Poke> {
-        (0..TRIES_MAX).find_map(|_| self.attempt(random))
+    fn choose(&self, shape: Shape, random: &mut Random) -> Option<Poke> {
+        (0..TRIES_MAX).find_map(|_| self.attempt(shape, random))
     }
 
-    fn attempt(&self, random: &mut Random) -> Option<Poke> {
+    fn attempt(&self, shape: Shape, random: &mut Random) -> Option<Poke> {
         if self.free.is_empty() {
             return None;
         }
@@ -255,15 +289,20 @@ impl<'a> Places<'a> {
         let thickness_m = first_hit(inside, direction, &self.points, self.triangles)?.distance;
         let from_m = touch - (1.0 + GAP_RADII) * radius_m * direction;
         let in_tissue_m = (depth_share * thickness_m).min(DEPTH_EXTENT_MAX * self.extent_m);
-        let is_clear = depth_m(from_m, radius_m, &self.points, self.triangles) < 0.0;
-        let is_thick = thickness_m > THICKNESS_SHARE_MIN * self.extent_m;
-        (is_clear && is_thick).then_some(Poke {
+        let poke = Poke {
             radius_m,
+            axis_m: match shape {
+                Shape::Ball => Vec3::ZERO,
+                Shape::Rod => -ROD_RADII * radius_m * direction,
+            },
             from_m,
             direction,
             way_m: GAP_RADII * radius_m + in_tissue_m,
             thickness_m,
-        })
+        };
+        let is_clear = poke.depth_m(from_m, &self.points, self.triangles) < 0.0;
+        let is_thick = thickness_m > THICKNESS_SHARE_MIN * self.extent_m;
+        (is_clear && is_thick).then_some(poke)
     }
 }
 
@@ -311,7 +350,9 @@ mod tests {
         let places = Places::new(&body, &body.mesh.points);
         let mut random = Random::new(7);
         for _ in 0..20 {
-            let poke = places.choose(&mut random).expect("a slab can be poked");
+            let poke = places
+                .choose(Shape::Rod, &mut random)
+                .expect("a slab can be poked");
             let depth = |x: Vec3| depth_m(x, 0.0, &places.points, places.triangles);
             assert!(depth(poke.from_m) < -f64::from(poke.radius_m));
             let front = poke.from_m + (poke.way_m + poke.radius_m) * poke.direction;
@@ -326,6 +367,7 @@ mod tests {
             scene: "slab".to_owned(),
             cell_share: 0.25,
             method: SolverParams::default().method,
+            shape: Shape::Rod,
             speed_m_s: 1.0,
             batch,
             pokes: 2,

@@ -2,7 +2,7 @@
 
 use super::super::findings::Findings;
 use super::super::sweep::{Row, State};
-use super::{Cell, Measures};
+use super::{Cell, Measures, Shape};
 use crate::measure::chart::{number, three_digits};
 use crate::measure::page::{Block, Table};
 use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
@@ -37,6 +37,7 @@ pub fn findings(rows: &[PokesRow]) -> Findings {
 struct Group<'a> {
     scene: &'a str,
     method: &'static str,
+    shape: Shape,
     speed_m_s: f64,
     rows: Vec<&'a PokesRow>,
 }
@@ -65,15 +66,17 @@ fn groups(rows: &[PokesRow]) -> Vec<Group<'_>> {
     let mut groups: Vec<Group> = Vec::new();
     for row in rows {
         let (scene, method) = (row.cell.scene.as_str(), row.cell.method.name());
-        let speed_m_s = row.cell.speed_m_s;
+        let (shape, speed_m_s) = (row.cell.shape, row.cell.speed_m_s);
         let same = |group: &&mut Group| {
-            (group.scene, group.method, group.speed_m_s) == (scene, method, speed_m_s)
+            (group.scene, group.method, group.shape, group.speed_m_s)
+                == (scene, method, shape, speed_m_s)
         };
         match groups.iter_mut().find(same) {
             Some(group) => group.rows.push(row),
             None => groups.push(Group {
                 scene,
                 method,
+                shape,
                 speed_m_s,
                 rows: vec![row],
             }),
@@ -105,7 +108,7 @@ fn lead(rows: &[PokesRow]) -> String {
 fn chart(groups: &[Group]) -> ScatterChart {
     let mut clouds: Vec<Cloud> = Vec::new();
     for group in groups {
-        let label = format!("{}, {}", group.scene, group.method);
+        let label = format!("{}, {}, {}", group.scene, group.method, group.shape.name());
         let point = Point {
             x: group.speed_m_s,
             y: (!group.has_failed()).then(|| 100.0 * group.deepest()),
@@ -142,6 +145,7 @@ fn table(groups: &[Group]) -> Table {
     let head = [
         "organ",
         "method",
+        "tool",
         "m/s",
         "pokes",
         "not finite",
@@ -151,6 +155,7 @@ fn table(groups: &[Group]) -> Table {
         "deepest %",
         "force N",
         "ms p50",
+        "ms p95",
     ];
     let line = |group: &Group| {
         let largest = |value: &dyn Fn(&PokesRow) -> Option<f64>| {
@@ -162,6 +167,7 @@ fn table(groups: &[Group]) -> Table {
         vec![
             group.scene.to_owned(),
             group.method.to_owned(),
+            group.shape.name().to_owned(),
             number(group.speed_m_s),
             group.pokes().to_string(),
             group.sum(|m| m.not_finite).to_string(),
@@ -171,6 +177,7 @@ fn table(groups: &[Group]) -> Table {
             three_digits(100.0 * group.deepest()),
             largest(&|row| row.measures.force_max_n),
             largest(&|row| row.cost.ms_p50),
+            largest(&|row| row.cost.ms_p95),
         ]
     };
     Table {
