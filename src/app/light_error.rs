@@ -25,6 +25,8 @@ pub struct Snapshot {
     pub triangles: Vec<[u32; 3]>,
     /// What the shaders read; the maps of light `k` are those of eye `k`.
     pub drawn: Drawn,
+    /// How its planes are blended.
+    pub blend: Blend,
     /// The lights, the one that casts shadows first.
     pub lights: Vec<PlacedLight>,
     /// How far light is followed [m].
@@ -165,7 +167,7 @@ impl<'a> Answering<'a> {
                 continue;
             }
             exact += self.tissue.glow(t, way.length_m, sight.step_m());
-            let told = cover.way_m(sight, 0, t, Blend::Squared);
+            let told = cover.way_m(sight, 0, t, self.snapshot.blend);
             got += self.tissue.glow(t, told, sight.step_m());
         }
         (got, exact)
@@ -301,6 +303,7 @@ mod tests {
                 normals: normals.iter().map(|n| n.extend(0.0)).collect(),
                 primitives: quadrics.map_or(DrawnPrimitives::Tangent, DrawnPrimitives::Quadrics),
             },
+            blend: Blend::Squared,
             lights: vec![light(Vec3::new(0.5, 0.6, 1.0)), light(Vec3::X)],
             radius_m: 0.3 * RADIUS_M,
             orbit: Orbit::new(0.3 * Vec3::Z, Vec3::ZERO, Vec3::Y, 0.6),

@@ -12,8 +12,8 @@ use crate::passes::frame::{FramePasses, effective_method, light_radius_m};
 use crate::passes::light_path::{Primitives, RefitCounts};
 use crate::passes::tools::DrawnTool;
 use crate::passes::view::View;
-use crate::scene::Scene;
-use crate::study::planes::{Drawn, DrawnPrimitives, read_depth_maps};
+use crate::scene::{Quadrature, Scene};
+use crate::study::planes::{Blend, Drawn, DrawnPrimitives, read_depth_maps};
 use glam::Vec3;
 use image::RgbaImage;
 use std::sync::Arc;
@@ -237,12 +237,17 @@ impl Renderer {
                 DrawnPrimitives::DepthMaps(maps.into_iter().map(|map| vec![map]).collect())
             }
         };
+        let is_planes = matches!(primitives, DrawnPrimitives::Planes(_));
         Ok(Some(Snapshot {
             points: points.to_vec(),
             triangles: session.mesh.point_triangles(),
             drawn: Drawn {
                 normals: read_buffer(gpu, &self.passes.tangents.normals)?,
                 primitives,
+            },
+            blend: match session.scene.surface.quadrature {
+                Quadrature::Published if is_planes => Blend::Published,
+                _ => Blend::Squared,
             },
             lights: lights.to_vec(),
             radius_m: light_radius_m(&session.scene),

@@ -31,7 +31,9 @@ pub struct Hit {
 /// the first contact; where it gets no further, it says that there is one.
 pub fn sweep(axis: Axis, radius_m: f32, start: [Vec3; 3], end: [Vec3; 3]) -> Option<Hit> {
     let at = |time: f32| -> [Vec3; 3] { std::array::from_fn(|k| start[k].lerp(end[k], time)) };
-    let way_m = (0..3).map(|k| start[k].distance(end[k])).fold(0.0, f32::max);
+    let way_m = (0..3)
+        .map(|k| start[k].distance(end[k]))
+        .fold(0.0, f32::max);
     let (mut time, mut last) = (0.0_f32, -1.0);
     let mut advances = 0;
     loop {

@@ -73,7 +73,8 @@ impl DepthMap {
 pub enum Blend {
     /// By the square of the share of the way: ours.
     Squared,
-    /// By the share itself: François 2006, eq. 9.
+    /// By the share itself, and with the absolute values that let light through planes that face away: François 2006,
+    /// eqs. 9 and 10.
     Published,
 }
 
@@ -188,13 +189,27 @@ impl Cover<'_> {
                     plane_eye: plane.dot(eye),
                     offset_m,
                 };
-                let share = (t_m / reach_m) as f32;
-                let share = match blend {
-                    Blend::Squared => share * share,
-                    Blend::Published => share,
-                };
+                let (t, share) = (t_m as f32, (t_m / reach_m) as f32);
                 let (tangent_light, plane_light) = (normal.dot(light), plane.dot(light));
-                light_plane::way_to_light(&pair, t_m as f32, share, tangent_light, plane_light)
+                match blend {
+                    Blend::Squared => light_plane::way_to_light(
+                        &pair,
+                        t,
+                        share * share,
+                        tangent_light,
+                        plane_light,
+                    ),
+                    Blend::Published => {
+                        let (way, cosine) = light_plane::way_as_printed(
+                            &pair,
+                            t,
+                            share,
+                            tangent_light,
+                            plane_light,
+                        );
+                        Some((way, cosine))
+                    }
+                }
             }
             Self::Quadric { normal, quadric } => {
                 let (u, v) = normal.any_orthonormal_pair();

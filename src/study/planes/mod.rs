@@ -8,6 +8,7 @@ mod deform;
 mod estimate;
 mod exact;
 mod picture;
+mod prod;
 mod show;
 mod sight;
 mod stage;
@@ -95,7 +96,7 @@ pub struct DriftPlan {
 pub struct OraclePlan {
     /// Points looked at by each of four eyes.
     pub sights: u32,
-    /// The picture beside the chart: pixels of a panel's side; 0 for none.
+    /// The picture beside the chart: pixels of a panel's side; 0 for none, and for no simulated prodding.
     pub picture_px: u32,
 }
 
@@ -323,7 +324,8 @@ impl Sweep for Planes {
             return Ok(());
         }
         let bench = Bench::new(Gpu::headless().map_err(AppError::Gpu)?, threads);
-        picture::write(&bench, side_px, out)
+        picture::write(&bench, side_px, out)?;
+        prod::write(&bench, plan.oracle.sights, out)
     }
 
     fn findings(rows: &[Row<Cell, Measures>]) -> Findings {

@@ -14,12 +14,12 @@ type PlanesRow = Row<Cell, Measures>;
 
 const CHART_PX: (f64, f64) = (470.0, 340.0);
 const COLUMNS: usize = 2;
-/// What the charts show of the cost [ms].
-const MS_RANGE: (f64, f64) = (0.003, 200.0);
+/// Stale planes by the kinder reading of the thesis: they keep their place in the body, and do not turn with it.
+const MOVED_ALONG: &str = "stale, moved along";
 /// Where a method without a pass stands [ms].
 const NO_PASS_MS: f64 = 0.004;
-/// What the charts show of the error [%].
-const ERROR_RANGE: (f64, f64) = (0.1, 100.0);
+/// Room beyond the smallest and the largest value of the charts.
+const ROOM: f64 = 1.6;
 /// The size of mesh that charts show, or what is nearest to it.
 const SHOWN_VERTICES: u32 = 10_000;
 
@@ -32,7 +32,17 @@ pub fn findings(rows: &[PlanesRow]) -> Findings {
         };
     };
     let shown: Vec<&PlanesRow> = rows.iter().filter(|row| of_body(row, &shown)).collect();
-    let charts = charts(&shown);
+    let mut charts = charts(&shown);
+    let ranges = [
+        ranges(&charts, |point| Some(point.x)),
+        ranges(&charts, |point| point.y),
+    ];
+    for (_, chart) in &mut charts {
+        (chart.x_range, chart.y_range) = (ranges[0], ranges[1]);
+    }
+    let charts: Vec<(String, String)> = (charts.into_iter())
+        .map(|(title, chart)| (title, chart.svg()))
+        .collect();
     let mut blocks = vec![Block::Paragraph(lead(&shown))];
     blocks.push(Block::Charts(
         charts
@@ -156,36 +166,58 @@ fn share_name(share: f64) -> String {
 }
 
 /// A chart of all deformations together and one of each: title and itself.
-fn charts(rows: &[&PlanesRow]) -> Vec<(String, String)> {
+fn charts(rows: &[&PlanesRow]) -> Vec<(String, ScatterChart)> {
     let deformations = distinct(rows.iter().map(|row| row.cell.deformation));
-    let together = chart(rows, "moved, mean of all but ripples", |method, radius| {
-        Some((
-            median_ms(rows, method, radius),
-            mean(rows, method, radius, |m| m.radiance_error_rel)?,
-        ))
-    });
+    let together = chart(
+        rows,
+        "moved, mean of all but ripples",
+        |method, radius, measure| {
+            Some((
+                median_ms(rows, method, radius),
+                mean(rows, method, radius, measure)?,
+            ))
+        },
+    );
     let each = deformations.into_iter().map(|deformation| {
-        chart(rows, deformation.name(), |method, radius| {
+        chart(rows, deformation.name(), |method, radius, measure| {
             let measures = &row_of(rows, method, deformation, radius)?.measures;
-            Some((measures.refit_ms_p50, measures.radiance_error_rel?))
+            Some((measures.refit_ms_p50, measure(measures)?))
         })
     });
     std::iter::once(together).chain(each).collect()
 }
+
+/// A range that holds all values of `of`, with room at both ends.
+fn ranges(charts: &[(String, ScatterChart)], of: impl Fn(&Point) -> Option<f64>) -> (f64, f64) {
+    let clouds = charts.iter().flat_map(|(_, chart)| &chart.clouds);
+    let values = clouds.flat_map(|cloud| &cloud.points).filter_map(of);
+    let positive = values.filter(|value| *value > 0.0 && value.is_finite());
+    let (low, high) = positive.fold((f64::MAX, 0.0_f64), |(low, high), value| {
+        (low.min(value), high.max(value))
+    });
+    if low > high {
+        (0.1, 100.0)
+    } else {
+        (low / ROOM, high * ROOM)
+    }
+}
+
+/// A number of a row's measures.
+type Measure = fn(&Measures) -> Option<f64>;
 
 /// Cost [ms], if there is a pass, and error of radiance by `of`, a method and a radius: a point a radius, the larger the
 /// farther the patches reach.
 fn chart(
     rows: &[&PlanesRow],
     title: &str,
-    of: impl Fn(LightPathMethod, f64) -> Option<(Option<f64>, f64)>,
-) -> (String, String) {
+    of: impl Fn(LightPathMethod, f64, Measure) -> Option<(Option<f64>, f64)>,
+) -> (String, ScatterChart) {
     let radii = radii(rows);
-    let points = |method| -> Vec<Point> {
+    let points = |method, measure: Measure| -> Vec<Point> {
         let indexed = radii.iter().enumerate();
         indexed
             .filter_map(|(index, &radius)| {
-                let (ms, error) = of(method, radius)?;
+                let (ms, error) = of(method, radius, measure)?;
                 Some(Point {
                     x: ms.unwrap_or(0.0).max(NO_PASS_MS),
                     y: Some(100.0 * error),
@@ -195,27 +227,38 @@ fn chart(
             })
             .collect()
     };
+    let mut clouds: Vec<Cloud> = LightPathMethod::ALL
+        .into_iter()
+        .enumerate()
+        .filter(|(_, method)| methods(rows).contains(method))
+        .map(|(look, method)| Cloud {
+            label: method.name().to_owned(),
+            look,
+            hollow: false,
+            joined: true,
+            points: points(method, |m| m.radiance_error_rel),
+        })
+        .collect();
+    let along = points(LightPathMethod::Stale, |m| m.radiance_error_unturned_rel);
+    if !along.is_empty() {
+        clouds.push(Cloud {
+            label: MOVED_ALONG.to_owned(),
+            look: LightPathMethod::ALL.len(),
+            hollow: true,
+            joined: true,
+            points: along,
+        });
+    }
     let chart = ScatterChart {
         size_px: CHART_PX,
         title: format!("{title}; {}", sizes(rows)),
         x_label: format!("GPU time of the refit [ms]; at {NO_PASS_MS}: no pass"),
         y_label: "error of radiance [%]".to_owned(),
-        x_range: MS_RANGE,
-        y_range: ERROR_RANGE,
-        clouds: LightPathMethod::ALL
-            .into_iter()
-            .enumerate()
-            .filter(|(_, method)| methods(rows).contains(method))
-            .map(|(look, method)| Cloud {
-                label: method.name().to_owned(),
-                look,
-                hollow: false,
-                joined: true,
-                points: points(method),
-            })
-            .collect(),
+        x_range: (1.0, 10.0),
+        y_range: (1.0, 10.0),
+        clouds,
     };
-    (title.to_owned(), chart.svg())
+    (title.to_owned(), chart)
 }
 
 /// Time of a method's pass [ms] in the middle of the deformations that [`mean`] is over: a single one may have been
@@ -251,6 +294,14 @@ fn errors(rows: &[&PlanesRow]) -> Table {
                 percent(row.and_then(|row| row.measures.radiance_error_rel))
             }));
             lines.push(line);
+            if method == LightPathMethod::Stale {
+                let mut line = vec![deformation.name().to_owned(), MOVED_ALONG.to_owned()];
+                line.extend(radii.iter().map(|&radius| {
+                    let row = row_of(rows, method, deformation, radius);
+                    percent(row.and_then(|row| row.measures.radiance_error_unturned_rel))
+                }));
+                lines.push(line);
+            }
         }
     }
     Table { head, rows: lines }
@@ -384,6 +435,7 @@ fn bodies(rows: &[PlanesRow]) -> Table {
     let methods = methods(&short);
     let mut head = vec!["body".to_owned(), "radius".to_owned()];
     head.extend(methods.iter().map(|method| method.name().to_owned()));
+    head.push(MOVED_ALONG.to_owned());
     let mut lines = Vec::new();
     for body in distinct(short.iter().map(|row| body_of(row))) {
         let own: Vec<&PlanesRow> = short
@@ -398,6 +450,10 @@ fn bodies(rows: &[PlanesRow]) -> Table {
                     .iter()
                     .map(|&method| percent(mean(&own, method, radius, |m| m.radiance_error_rel))),
             );
+            let stale = LightPathMethod::Stale;
+            line.push(percent(mean(&own, stale, radius, |m| {
+                m.radiance_error_unturned_rel
+            })));
             lines.push(line);
         }
     }
@@ -458,6 +514,14 @@ fn lead(rows: &[&PlanesRow]) -> String {
             best.name(),
             three_digits(stale / error)
         );
+        let along = row_of(rows, LightPathMethod::Stale, Deformation::Poke, radius)
+            .and_then(|row| row.measures.radiance_error_unturned_poked_rel);
+        if let Some(along) = along {
+            text += &format!(
+                " If those moved along with their points, unturned, it would be {} times.",
+                three_digits(along / error)
+            );
+        }
     }
     text
 }

@@ -263,10 +263,24 @@ impl Bench {
         points: &[Vec3],
         lights: &[[DVec3; 3]],
     ) -> Result<Drawn, AppError> {
-        let knobs = knobs(method, radius_m, 0.0);
-        let mut stage = Stage::new(&self.gpu, body, knobs, Vec3::ZERO)?;
+        let mut stage = self.stage(body, method, radius_m)?;
         stage.untimed_frame(points);
         Ok(stage.drawn(points, lights)?)
+    }
+
+    /// The passes of `method` for `body` at rest.
+    ///
+    /// # Errors
+    ///
+    /// [`AppError::Gpu`] if the adapter refuses it.
+    pub fn stage(
+        &self,
+        body: &Body,
+        method: LightPathMethod,
+        radius_m: f32,
+    ) -> Result<Stage, AppError> {
+        let knobs = knobs(method, radius_m, 0.0);
+        Ok(Stage::new(&self.gpu, body, knobs, Vec3::ZERO)?)
     }
 }
 
