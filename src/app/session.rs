@@ -122,6 +122,7 @@ impl Session {
         let why = match cause {
             HandOver::TooStiff => "the tissue was too stiff for",
             HandOver::WavesGrew => "waves grew in the tissue, which is too stiff for",
+            HandOver::Folded => "some of the tissue had been inside out for half a second by",
             HandOver::Trembled => {
                 "some of the tissue had trembled for half a second, as poor tetrahedra do by"
             }
@@ -291,7 +292,7 @@ fn solver_notes(scene: &Scene, simulation: &Simulation) -> Vec<String> {
     let (asked, taken) = (scene.solver, simulation.params());
     if taken.method != asked.method {
         notes.push(format!(
-            "tissue of {:.0} Pa is too stiff for {} in {} on this mesh, and would sag too far: \
+            "tissue of {:.0} Pa is too stiff for {} in {} on this mesh, and would sag too far or tremble: \
              {} is taken, in {}",
             asked.youngs_modulus_pa,
             asked.method.name(),

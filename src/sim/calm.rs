@@ -1,4 +1,4 @@
-//! Whether a body goes anywhere, and whether it trembles.
+//! Whether a body goes anywhere, and whether it trembles or stays folded.
 
 use super::particles::Particles;
 use glam::{Vec3, Vec4};
@@ -8,8 +8,9 @@ const CALM_SIZES: f32 = 1e-4;
 /// Calm for so long, it falls asleep [s]: longer than it hangs still at the turning point of a
 /// swing.
 const CALM_S: f32 = 0.5;
-/// So long without a pause, turning back and forth is no blow that dies away [s].
-const TREMBLE_S: f32 = 0.5;
+/// So long without a pause, turning back and forth is no blow that dies away, and being inside out no moment of a
+/// large motion [s].
+const TROUBLE_S: f32 = 0.5;
 /// Turned back with less of its speed than this, a particle was stopped and does not tremble.
 const TURNED_SHARE: f32 = 0.5;
 
@@ -24,8 +25,9 @@ pub struct Calm {
     calm_steps: u32,
     /// Velocities before the last substep [m/s]; nothing until the first.
     before: Vec<Vec3>,
-    /// For how many steps in a row the body has trembled.
+    /// For how many steps in a row the body has trembled, and had tetrahedra inside out.
     trembling_steps: u32,
+    folded_steps: u32,
 }
 
 impl Calm {
@@ -37,6 +39,7 @@ impl Calm {
             calm_steps: 0,
             before: Vec::new(),
             trembling_steps: 0,
+            folded_steps: 0,
         }
     }
 
@@ -45,9 +48,9 @@ impl Calm {
         self.calm_steps = 0;
     }
 
-    /// It is another body than the one that trembled.
-    pub fn forget_trembling(&mut self) {
-        self.trembling_steps = 0;
+    /// Forgets that the body has trembled and is folded: it is another one, or something presses it.
+    pub fn forget_troubles(&mut self) {
+        (self.trembling_steps, self.folded_steps) = (0, 0);
         self.before.clear();
     }
 
@@ -58,7 +61,13 @@ impl Calm {
     }
 
     /// Looks at the body after a step; `stirred` from outside, it is not calm.
-    pub fn watch(&mut self, particles: &Particles, substep_s: f32, stirred: bool) {
+    pub fn watch(
+        &mut self,
+        particles: &Particles,
+        substep_s: f32,
+        stirred: bool,
+        inverted_tets: usize,
+    ) {
         // By the way and not the speed: where something presses, light particles tremble by less. A tremble of two
         // substeps is back where it was as a step ends, so the way of a substep counts too.
         let goes = particles.speed_max_m_s() * substep_s > self.way_max_m
@@ -74,6 +83,11 @@ impl Calm {
         } else {
             self.trembling_steps = 0;
         }
+        self.folded_steps = if inverted_tets > 0 {
+            self.folded_steps + 1
+        } else {
+            0
+        };
     }
 
     /// Whether the body has been calm for so long that it may sleep.
@@ -83,8 +97,17 @@ impl Calm {
 
     /// Whether some particle or other has turned back in every substep looked at for so long that it will not stop.
     pub fn trembles(&self, timestep_s: f32) -> bool {
-        self.trembling_steps >= ((TREMBLE_S / timestep_s).round() as u32).max(2)
+        self.trembling_steps >= trouble_steps(timestep_s)
     }
+
+    /// Whether tetrahedra have been inside out for so long that they will not turn back.
+    pub fn is_folded(&self, timestep_s: f32) -> bool {
+        self.folded_steps >= trouble_steps(timestep_s)
+    }
+}
+
+fn trouble_steps(timestep_s: f32) -> u32 {
+    ((TROUBLE_S / timestep_s).round() as u32).max(2)
 }
 
 /// Half of the largest change of velocity of a particle that turned back, which is its speed if it goes back and
@@ -122,7 +145,7 @@ mod tests {
             particles.velocities[1] = before;
             calm.before_last_substep(&particles);
             particles.velocities[1] = velocity;
-            calm.watch(&particles, SUBSTEP_S, false);
+            calm.watch(&particles, SUBSTEP_S, false, 1);
         }
         calm
     }
@@ -138,6 +161,7 @@ mod tests {
     fn body_at_rest_may_sleep_and_one_under_way_does_neither() {
         let still = watched(Vec3::ZERO, Vec3::ZERO);
         assert!(still.may_sleep(STEP_S) && !still.trembles(STEP_S));
+        assert!(still.is_folded(STEP_S), "it has one inside out");
         let under_way = watched(0.2 * Vec3::Z, 0.2 * Vec3::Z);
         assert!(!under_way.may_sleep(STEP_S) && !under_way.trembles(STEP_S));
         let stopped = watched(-0.5 * Vec3::Z, 0.2 * Vec3::Z);
@@ -153,7 +177,7 @@ mod tests {
     #[test]
     fn another_body_has_not_trembled() {
         let mut calm = watched(-0.2 * Vec3::Z, 0.2 * Vec3::Z);
-        calm.forget_trembling();
-        assert!(!calm.trembles(STEP_S));
+        calm.forget_troubles();
+        assert!(!calm.trembles(STEP_S) && !calm.is_folded(STEP_S));
     }
 }

@@ -14,6 +14,8 @@ pub enum HandOver {
     WavesGrew,
     /// Poor tetrahedra of it go back and forth.
     Trembled,
+    /// Tetrahedra of it stay inside out.
+    Folded,
 }
 
 impl HandOver {
@@ -30,6 +32,8 @@ impl HandOver {
             Some(Self::WavesGrew.take(simulation))
         } else if simulation.trembles() {
             Some(Self::Trembled.take(simulation))
+        } else if simulation.is_folded() {
+            Some(Self::Folded.take(simulation))
         } else {
             None
         }

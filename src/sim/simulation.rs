@@ -156,7 +156,7 @@ impl Simulation {
             self.model = self.new_model();
         }
         self.solver = params;
-        self.calm.forget_trembling();
+        self.calm.forget_troubles();
         self.wake();
     }
 
@@ -215,7 +215,7 @@ impl Simulation {
             self.model.shorten(0.0);
         }
         self.model.forget(&mut self.particles.places, &self.solver);
-        self.calm.forget_trembling();
+        self.calm.forget_troubles();
         self.wake();
         self.publish(&Team::alone());
     }
@@ -356,6 +356,12 @@ impl Simulation {
         matches!(self.model, Model::NeoHookean(_)) && self.calm.trembles(self.solver.timestep_s)
     }
 
+    /// Whether tetrahedra have been inside out for half a second with nothing pressing, as a sliver can with too few
+    /// substeps of `xpbd-neo-hookean`.
+    pub fn is_folded(&self) -> bool {
+        matches!(self.model, Model::NeoHookean(_)) && self.calm.is_folded(self.solver.timestep_s)
+    }
+
     /// Volume of the shapes that the tetrahedra want now [m³].
     fn rest_volume_now_m3(&self) -> f64 {
         self.rest_volume_m3 - self.beating.as_ref().map_or(0.0, Beating::lost_m3)
@@ -407,9 +413,15 @@ impl Simulation {
         let forces_n = self.tools.forces_n(self.solver.substeps);
         if forces_n.iter().any(|force_n| *force_n != Vec3::ZERO) {
             // Light particles between a tool and the tissue rattle, and that passes with the tool.
-            self.calm.forget_trembling();
+            self.calm.forget_troubles();
         }
-        (self.calm).watch(&self.particles, self.solver.substep_s(), stirred);
+        let inverted_tets = if self.model.is_restoring() {
+            0
+        } else {
+            standing.inverted_tets
+        };
+        let substep_s = self.solver.substep_s();
+        (self.calm).watch(&self.particles, substep_s, stirred, inverted_tets);
         let surface = surface(&self.setup, &self.points, self.point_bounds);
         self.report = StepReport {
             residual_rms: standing.residual_rms,
