@@ -187,6 +187,7 @@ pub fn solver(ui: &mut Ui, session: &mut Session) {
 pub fn body(ui: &mut Ui, session: &mut Session) {
     ui.separator();
     ui.strong("Body");
+    let longest_m = session.rest.longest_m();
     let body = &mut session.scene.body;
     three(
         ui,
@@ -197,9 +198,11 @@ pub fn body(ui: &mut Ui, session: &mut Session) {
     );
     ui.add(Slider::new(&mut body.damping_per_s, 0.0..=50.0).text("damping [1/s]"));
     ui.add(Slider::new(&mut body.density_kg_m3, 100.0..=5000.0).text("density [kg/m³]"));
-    if let Some(size_m) = &mut body.size_m {
-        let size = Slider::new(size_m, 0.005..=1.0).logarithmic(true);
-        ui.add(size.text("size [m]"));
+    // Left out, it is as long as its file or shape says.
+    let mut size_m = body.size_m.unwrap_or(longest_m);
+    let size = Slider::new(&mut size_m, 0.005..=1.0).logarithmic(true);
+    if ui.add(size.text("size [m]")).changed() {
+        body.size_m = Some(size_m);
     }
     if let Some(cell_m) = &mut body.cell_m {
         let cell = Slider::new(cell_m, 1e-3..=0.05).logarithmic(true);

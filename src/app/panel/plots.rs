@@ -56,7 +56,7 @@ const STAGE_COLORS: [Color32; 8] = [
 ];
 
 fn stage_plot(ui: &mut Ui, history: &History) {
-    ui.label(RichText::new("frame time by stage [ms], the whole frame in white").weak());
+    ui.label(RichText::new("frame time by stage [ms], the whole frame in white; peaks beyond three medians are cut").weak());
     let stage_ceiling_ms = 2.0 * history.median_wall_ms();
     let mut charts: Vec<BarChart> = Vec::new();
     for (index, stage) in history.stages().into_iter().enumerate() {

@@ -56,6 +56,15 @@ pub fn validate(options: &ValidateOptions) -> Result<Outcome, AppError> {
     write_all(&options.out, &gpu.adapter, surface, &rows)?;
     let missed = rows.iter().filter(|row| row.missed()).count();
     let met = rows.iter().filter(|row| row.goal.is_some()).count() - missed;
+    let absent = goals.without_scene(&rows);
+    for name in &absent {
+        let scenes = options.dir.join("scenes");
+        say(&format!(
+            "{name}: a goal without a scene: add {} or take the goal out\n",
+            scenes.join(format!("{name}.json")).display()
+        ));
+    }
+    let missed = missed + absent.len();
     say(&format!("{met} goals met, {missed} missed\n"));
     Ok(if missed == 0 {
         Outcome::Done

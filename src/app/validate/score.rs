@@ -67,6 +67,14 @@ impl Goals {
         Ok(Self(file.single))
     }
 
+    /// Names of goals of which no scene is among `rows`, in order.
+    pub fn without_scene(&self, rows: &[Scored]) -> Vec<&str> {
+        let is_absent = |name: &&str| rows.iter().all(|row| row.name != *name);
+        let mut names: Vec<&str> = self.0.keys().map(String::as_str).filter(is_absent).collect();
+        names.sort_unstable();
+        names
+    }
+
     /// The goal of the scene called `name`.
     pub fn of(&self, name: &str) -> Option<Goal> {
         self.0.get(name).copied()
@@ -293,5 +301,30 @@ impl Scored {
             "surface_ms_p50": self.surface_ms,
             "frame_ms_p50": self.frame_ms,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn goals_of_scenes_that_are_not_there_are_named() {
+        let goal = Goal {
+            rel_rmse: 0.1,
+            flip: None,
+            vein: None,
+        };
+        let names = ["seen", "lost", "gone"];
+        let goals = Goals(names.map(|name| (name.to_owned(), goal)).into());
+        let seen = Scored {
+            name: "seen".to_owned(),
+            scores: None,
+            goal: Some(goal),
+            full: None,
+            surface_ms: None,
+            frame_ms: None,
+        };
+        assert_eq!(goals.without_scene(&[seen]), ["gone", "lost"]);
     }
 }
