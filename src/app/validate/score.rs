@@ -70,7 +70,12 @@ impl Goals {
     /// Names of goals of which no scene is among `rows`, in order.
     pub fn without_scene(&self, rows: &[Scored]) -> Vec<&str> {
         let is_absent = |name: &&str| rows.iter().all(|row| row.name != *name);
-        let mut names: Vec<&str> = self.0.keys().map(String::as_str).filter(is_absent).collect();
+        let mut names: Vec<&str> = self
+            .0
+            .keys()
+            .map(String::as_str)
+            .filter(is_absent)
+            .collect();
         names.sort_unstable();
         names
     }
