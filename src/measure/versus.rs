@@ -230,6 +230,13 @@ pub fn told(names: [&str; 2], runs: [&TimedRun; 2]) -> String {
             "{letter}  {name}: {scene}, {frames} frames, {width}x{height}, {threads} threads, commit {commit}, {adapter}"
         ));
     }
+    let unlike = unlike(&runs[0].setting, &runs[1].setting);
+    if !unlike.is_empty() {
+        line(format!(
+            "Not the same in both: {}; what differs below may come from that.",
+            unlike.join(", ")
+        ));
+    }
     let stages = stages(runs[0], runs[1]);
     line(format!(
         "\n{:<16}{:>10}{:>10}{:>8}{:>10}{:>10}",
@@ -252,13 +259,27 @@ pub fn told(names: [&str; 2], runs: [&TimedRun; 2]) -> String {
     line(verdict(&stages));
     if runs[0].setting.state_sha256 == runs[1].setting.state_sha256 {
         line("Both end in the same state, bit for bit.".to_owned());
-    } else {
+    } else if runs[0].setting.frames == runs[1].setting.frames {
         line(
             "They end in different states; `palpate replay … --against` says by how much."
                 .to_owned(),
         );
     }
     text
+}
+
+/// What was not the same for both runs, commits apart.
+fn unlike(a: &Setting, b: &Setting) -> Vec<&'static str> {
+    [
+        ("scene", a.scene != b.scene),
+        ("number of frames", a.frames != b.frames),
+        ("size of the picture", a.size != b.size),
+        ("threads", a.threads != b.threads),
+        ("adapter", a.adapter != b.adapter),
+    ]
+    .into_iter()
+    .filter_map(|(what, differs)| differs.then_some(what))
+    .collect()
 }
 
 /// What became of the frame, and which stages it owes that to.
@@ -314,6 +335,20 @@ mod tests {
             log += &format!("{frame},0.1,{},{sim},{surface},1.5\n", sim + surface);
         }
         log
+    }
+
+    #[test]
+    fn runs_of_different_length_and_size_are_told_to_be_so_and_their_ends_are_not_compared() {
+        let (a, mut b) = (run(&log(10.0)), run(&log(10.0)));
+        assert!(!told(["a", "b"], [&a, &b]).contains("Not the same"));
+        (b.setting.frames, b.setting.size) = (7, [9, 9]);
+        b.setting.state_sha256 = "a0".to_owned();
+        let text = told(["a", "b"], [&a, &b]);
+        assert!(
+            text.contains("Not the same in both: number of frames, size of the picture;"),
+            "{text}"
+        );
+        assert!(!text.contains("different states"), "{text}");
     }
 
     #[test]
