@@ -2,6 +2,7 @@
 
 use super::body::Body;
 use super::estimate::{Blend, Drawn, errors_of};
+use super::show::MOVED_ALONG;
 use super::sight::{Truth, all_lights};
 use super::trial::Bench;
 use crate::app::{AppError, Session, load_scene};
@@ -18,6 +19,15 @@ const SCENES: [&str; 2] = ["spleen", "liver"];
 /// Frames between two looks, and the last that is looked at: push, slide, pull and release.
 const FRAMES_BETWEEN: u32 = 12;
 const FRAMES: u32 = 168;
+/// What the charts show: `carried`, `sampled` and `incremental` lie on `full`.
+const SHOWN: [&str; 6] = [
+    "tangent",
+    "stale",
+    MOVED_ALONG,
+    "full",
+    "quadric",
+    "depth-map",
+];
 const CHART_PX: (f64, f64) = (720.0, 360.0);
 
 /// How far off a method is at one time of a script.
@@ -84,7 +94,7 @@ fn follow(bench: &Bench, name: &'static str, sights: u32) -> Result<Vec<Look>, A
                 look(method.name(), &drawn);
                 if *method == LightPathMethod::Stale {
                     let rest: &[Vec3] = &body.mesh.points;
-                    look("stale, moved along", &drawn.moved_along(rest, &points));
+                    look(MOVED_ALONG, &drawn.moved_along(rest, &points));
                 }
             }
         }
@@ -115,7 +125,8 @@ fn csv(looks: &[Look]) -> String {
 fn chart(looks: &[&Look]) -> LineChart {
     let mut series: Vec<Series> = Vec::new();
     for look in looks {
-        let Some(error) = look.radiance_error_rel else {
+        let shown = SHOWN.contains(&look.method.as_str());
+        let Some(error) = look.radiance_error_rel.filter(|_| shown) else {
             continue;
         };
         let point = (f64::from(look.time_s), 100.0 * error);

@@ -15,7 +15,7 @@ type PlanesRow = Row<Cell, Measures>;
 const CHART_PX: (f64, f64) = (470.0, 340.0);
 const COLUMNS: usize = 2;
 /// Stale planes by the kinder reading of the thesis: they keep their place in the body, and do not turn with it.
-const MOVED_ALONG: &str = "stale, moved along";
+pub const MOVED_ALONG: &str = "stale, moved along";
 /// Where a method without a pass stands [ms].
 const NO_PASS_MS: f64 = 0.004;
 /// Room beyond the smallest and the largest value of the charts.
@@ -170,7 +170,7 @@ fn charts(rows: &[&PlanesRow]) -> Vec<(String, ScatterChart)> {
     let deformations = distinct(rows.iter().map(|row| row.cell.deformation));
     let together = chart(
         rows,
-        "moved, mean of all but ripples",
+        "moved, mean",
         |method, radius, measure| {
             Some((
                 median_ms(rows, method, radius),
@@ -275,10 +275,7 @@ fn median_ms(rows: &[&PlanesRow], method: LightPathMethod, radius: f64) -> Optio
 /// What the sizes of the markers mean.
 fn sizes(rows: &[&PlanesRow]) -> String {
     let radii: Vec<String> = radii(rows).into_iter().map(|r| number(100.0 * r)).collect();
-    format!(
-        "markers from small to large: radius of {} %",
-        radii.join(", ")
-    )
+    format!("radius {} %, small to large", radii.join(", "))
 }
 
 fn errors(rows: &[&PlanesRow]) -> Table {
