@@ -445,7 +445,8 @@ fn draw(
             p + away * wave * Vec3::new(0.6, 0.64, 0.48)
         })
         .collect();
-    let drawn = renderer.draw(&moved, None, &orbit, &[])?;
+    // The shadow of a tool is part of what a scene's shadow is for.
+    let drawn = renderer.draw(&moved, None, &orbit, &session.visible_tools())?;
     Ok(drawn.passes.iter().map(|pass| pass.gpu_ms).sum())
 }
 
