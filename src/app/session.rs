@@ -35,7 +35,8 @@ pub struct Session {
     script: Script,
     markers: Vec<Marker>,
     frame: u32,
-    handed_over_frame: Option<u32>,
+    /// When and why another solver took the place of the scene's.
+    handed_over: Option<(u32, HandOver)>,
 }
 
 /// What one time step did.
@@ -81,7 +82,7 @@ impl Session {
             .collect::<Result<_, _>>()?;
         let mut simulation = Simulation::new(setup, scene.solver);
         simulation.set_threads(Some(threads));
-        let is_handed = HandOver::at_start(&mut simulation).is_some();
+        let cause = HandOver::at_start(&mut simulation);
         simulation.set_beat(BeatSection::beat(scene.body.beat.as_ref()));
         let mut notes = notes;
         notes.extend(solver_notes(&scene, &simulation));
@@ -91,7 +92,7 @@ impl Session {
             script_plays: true,
             hand: None,
             frame: 0,
-            handed_over_frame: is_handed.then_some(0),
+            handed_over: cause.map(|cause| (0, cause)),
             scene,
             mesh,
             rest,
@@ -127,7 +128,7 @@ impl Session {
                 "some of the tissue had trembled for half a second, as poor tetrahedra do by"
             }
         };
-        self.handed_over_frame = Some(self.frame);
+        self.handed_over = Some((self.frame, cause));
         let taken = self.solver();
         let note = format!(
             "in frame {} {why} {} in {}: from there on {} is taken, in {}",
@@ -199,7 +200,7 @@ impl Session {
             .set_gravity_and_damping(body.gravity_m_s2, body.damping_per_s);
         self.simulation.set_params(self.scene.solver);
         let cause = HandOver::at_start(&mut self.simulation);
-        self.handed_over_frame = cause.map(|_| self.frame);
+        self.handed_over = cause.map(|cause| (self.frame, cause));
     }
 
     /// Takes over a changed heartbeat.
@@ -215,7 +216,12 @@ impl Session {
 
     /// The frame from which on another solver is taken than the scene's, 0 from the start; `None` if it is that.
     pub fn handed_over_frame(&self) -> Option<u32> {
-        self.handed_over_frame
+        self.handed_over.map(|(frame, _)| frame)
+    }
+
+    /// Why it is taken.
+    pub fn handed_over_for(&self) -> Option<HandOver> {
+        self.handed_over.map(|(_, cause)| cause)
     }
 
     /// Time steps since the start.

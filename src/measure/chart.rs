@@ -29,6 +29,8 @@ const TEXT_EXPECT: &str = "a string takes all that is written to it";
 pub struct Series {
     /// What it shows.
     pub label: String,
+    /// Colour; the same number is the same colour in every chart.
+    pub look: usize,
     /// Points in ascending x; a value that is not finite breaks the line.
     pub points: Vec<(f64, f64)>,
 }
@@ -89,7 +91,9 @@ impl LineChart {
         let (first, last) = xs.fold((f64::MAX, f64::MIN), |(low, high), x| {
             (low.min(x), high.max(x))
         });
-        let names: Vec<&str> = self.series.iter().map(|s| s.label.as_str()).collect();
+        let names: Vec<(&str, usize)> = (self.series.iter())
+            .map(|s| (s.label.as_str(), s.look))
+            .collect();
         let mut axes = Axes::new(self.size_px, (first, last), (low, high), names.len() > 1);
         if !self.levels.is_empty() {
             axes.right -= LEVEL_NAMES_PX;
@@ -98,8 +102,8 @@ impl LineChart {
         if names.len() > 1 {
             svg += &legend(&names);
         }
-        for (k, series) in self.series.iter().enumerate() {
-            let color = COLORS[k % COLORS.len()];
+        for series in &self.series {
+            let color = COLORS[series.look % COLORS.len()];
             write!(
                 svg,
                 "<path d=\"{}\" fill=\"none\" stroke=\"{color}\" stroke-width=\"1.3\" \
@@ -195,7 +199,9 @@ impl StackedChart {
                 .sum()
         };
         let high = (0..bars).map(height).fold(0.0_f64, f64::max);
-        let names: Vec<&str> = self.layers.iter().map(|(name, _)| name.as_str()).collect();
+        let names: Vec<(&str, usize)> = (self.layers.iter().zip(0..))
+            .map(|((name, _), layer)| (name.as_str(), layer))
+            .collect();
         let axes = Axes::new(self.size_px, (0.0, count as f64), (0.0, high), true);
         let mut svg = axes.open(&self.x_label, &self.y_label);
         svg += &legend(&names);
@@ -358,15 +364,15 @@ impl Axes {
 }
 
 /// Names of the series in a row above the plot, each behind a patch of its colour.
-fn legend(names: &[&str]) -> String {
+fn legend(names: &[(&str, usize)]) -> String {
     let mut svg = String::new();
     let mut x = LEFT_PX;
-    for (k, name) in names.iter().enumerate() {
+    for (name, look) in names {
         write!(
             svg,
             "<rect x=\"{x:.1}\" y=\"5\" width=\"10\" height=\"10\" rx=\"2\" fill=\"{}\"/>\
              <text x=\"{:.1}\" y=\"14\">{}</text>",
-            COLORS[k % COLORS.len()],
+            COLORS[look % COLORS.len()],
             x + 14.0,
             escape(name)
         )
@@ -468,6 +474,7 @@ mod tests {
             y_label: "ms".to_owned(),
             series: vec![Series {
                 label: "wall".to_owned(),
+                look: 0,
                 points: points.collect(),
             }],
             levels: Vec::new(),

@@ -187,6 +187,7 @@ fn frame_times(summary: &Summary, records: &[FrameRecord]) -> Section {
         y_label: "wall time of the frame [ms]".to_owned(),
         series: vec![Series {
             label: "frame".to_owned(),
+            look: 0,
             points: over_frames(records, |record| f64::from(record.wall_ms)),
         }],
         levels,
@@ -305,6 +306,7 @@ fn accuracy(records: &[FrameRecord]) -> Section {
             y_label: y_label.to_owned(),
             series: vec![Series {
                 label: y_label.to_owned(),
+                look: 0,
                 points: over_frames(records, value),
             }],
             levels: Vec::new(),

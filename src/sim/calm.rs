@@ -25,6 +25,8 @@ pub struct Calm {
     calm_steps: u32,
     /// Velocities before the last substep [m/s]; nothing until the first.
     before: Vec<Vec3>,
+    /// How fast some of the body went back and forth in the last substep [m/s].
+    tremble_m_s: f32,
     /// For how many steps in a row the body has trembled, and had tetrahedra inside out.
     trembling_steps: u32,
     folded_steps: u32,
@@ -38,6 +40,7 @@ impl Calm {
             places: particles.places.clone(),
             calm_steps: 0,
             before: Vec::new(),
+            tremble_m_s: 0.0,
             trembling_steps: 0,
             folded_steps: 0,
         }
@@ -48,16 +51,27 @@ impl Calm {
         self.calm_steps = 0;
     }
 
-    /// Forgets that the body has trembled and is folded: it is another one, or something presses it.
+    /// Forgets that the body has trembled and is folded: it is another one.
     pub fn forget_troubles(&mut self) {
         (self.trembling_steps, self.folded_steps) = (0, 0);
         self.before.clear();
+    }
+
+    /// Forgets that the body is folded: something presses it.
+    pub fn forget_folds(&mut self) {
+        self.folded_steps = 0;
     }
 
     /// Keeps the velocities that the last substep of a step starts with.
     pub fn before_last_substep(&mut self, particles: &Particles) {
         self.before.clear();
         self.before.extend_from_slice(&particles.velocities);
+    }
+
+    /// Looks at how particles went on in the last substep, before anything slows them. Those that carry what a tool
+    /// touches, `carriers` in order, rattle between tool and tissue, and count for nothing.
+    pub fn after_last_substep(&mut self, particles: &Particles, carriers: &[u32]) {
+        self.tremble_m_s = tremble_m_s(&self.before, &particles.velocities, carriers);
     }
 
     /// Looks at the body after a step; `stirred` from outside, it is not calm.
@@ -78,7 +92,7 @@ impl Calm {
         } else {
             self.calm_steps += 1;
         }
-        if tremble_m_s(&self.before, &particles.velocities) * substep_s > self.way_max_m {
+        if self.tremble_m_s * substep_s > self.way_max_m {
             self.trembling_steps += 1;
         } else {
             self.trembling_steps = 0;
@@ -111,14 +125,15 @@ fn trouble_steps(timestep_s: f32) -> u32 {
 }
 
 /// Half of the largest change of velocity of a particle that turned back, which is its speed if it goes back and
-/// forth [m/s].
-fn tremble_m_s(before: &[Vec3], now: &[Vec3]) -> f32 {
-    (before.iter().zip(now))
-        .filter(|(before, now)| {
+/// forth [m/s]; particles `but` a list in order.
+fn tremble_m_s(before: &[Vec3], now: &[Vec3], but: &[u32]) -> f32 {
+    (before.iter().zip(now).zip(0..))
+        .filter(|((before, now), _)| {
             before.dot(**now) < 0.0
                 && now.length_squared() > TURNED_SHARE * TURNED_SHARE * before.length_squared()
         })
-        .map(|(before, now)| before.distance_squared(*now))
+        .filter(|(_, particle)| but.binary_search(particle).is_err())
+        .map(|((before, now), _)| before.distance_squared(*now))
         .fold(0.0, f32::max)
         .sqrt()
         / 2.0
@@ -139,12 +154,18 @@ mod tests {
     /// Watches for a second while the free particle has `velocity` [m/s] in each last substep and `before` in the one
     /// before it, its place at the ends of steps being the same.
     fn watched(before: Vec3, velocity: Vec3) -> Calm {
+        watched_but(before, velocity, &[])
+    }
+
+    /// The same with particles that a tool touches.
+    fn watched_but(before: Vec3, velocity: Vec3, but: &[u32]) -> Calm {
         let mut particles = particles();
         let mut calm = Calm::new(&particles, 1.0);
         for _ in 0..60 {
             particles.velocities[1] = before;
             calm.before_last_substep(&particles);
             particles.velocities[1] = velocity;
+            calm.after_last_substep(&particles, but);
             calm.watch(&particles, SUBSTEP_S, false, 1);
         }
         calm
@@ -172,6 +193,14 @@ mod tests {
     fn tremble_too_small_to_see_is_none() {
         let calm = watched(-0.1 * Vec3::Z, 0.1 * Vec3::Z);
         assert!(calm.may_sleep(STEP_S) && !calm.trembles(STEP_S));
+    }
+
+    #[test]
+    fn what_a_tool_touches_rattles_and_does_not_tremble() {
+        let calm = watched_but(-0.2 * Vec3::Z, 0.2 * Vec3::Z, &[1]);
+        assert!(!calm.trembles(STEP_S));
+        let calm = watched_but(-0.2 * Vec3::Z, 0.2 * Vec3::Z, &[0]);
+        assert!(calm.trembles(STEP_S));
     }
 
     #[test]

@@ -131,6 +131,17 @@ impl Contacts {
         !self.vicinity.near.is_empty()
     }
 
+    /// The particles that carry what the tool touches.
+    pub fn carriers(&self) -> impl Iterator<Item = u32> {
+        let handles = self.touches.iter().map(|touch| touch.handle);
+        handles.flat_map(|handle| {
+            handle
+                .carriers()
+                .map(|(particle, _)| particle)
+                .collect::<Vec<_>>()
+        })
+    }
+
     /// Number of active contacts.
     pub fn len(&self) -> usize {
         self.touches.len()

@@ -148,6 +148,12 @@ impl Grab {
         }
     }
 
+    /// The particles that carry what is held.
+    pub fn carriers(&self) -> impl Iterator<Item = u32> {
+        let handles = self.holds.iter().map(|hold| &hold.handle);
+        handles.flat_map(|handle| handle.carriers().map(|(particle, _)| particle))
+    }
+
     /// Number of places held.
     pub fn len(&self) -> usize {
         self.holds.len()

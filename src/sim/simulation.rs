@@ -412,8 +412,8 @@ impl Simulation {
         let stirred = stirred || beats || self.model.is_restoring();
         let forces_n = self.tools.forces_n(self.solver.substeps);
         if forces_n.iter().any(|force_n| *force_n != Vec3::ZERO) {
-            // Light particles between a tool and the tissue rattle, and that passes with the tool.
-            self.calm.forget_troubles();
+            // What is pressed may well be folded, and that passes with the tool.
+            self.calm.forget_folds();
         }
         let inverted_tets = if self.model.is_restoring() {
             0
@@ -451,6 +451,7 @@ impl Simulation {
             }
             self.substep(team, substep);
         }
+        (self.calm).after_last_substep(&self.particles, &self.tools.carriers());
         if let Some(beating) = &mut self.beating {
             beating.advance(f64::from(self.solver.timestep_s));
         }

@@ -324,6 +324,19 @@ impl Tools {
         }
     }
 
+    /// The particles that carry what a tool touches or holds, in order.
+    pub fn carriers(&self) -> Vec<u32> {
+        let mut carriers: Vec<u32> = (self.tools.iter())
+            .flat_map(|tool| {
+                let held = tool.grab.iter().flat_map(Grab::carriers);
+                tool.contacts.carriers().chain(held)
+            })
+            .collect();
+        carriers.sort_unstable();
+        carriers.dedup();
+        carriers
+    }
+
     /// Mean force on each tool over a step of so many substeps [N].
     pub fn forces_n(&self, substeps: u32) -> Vec<Vec3> {
         let share = 1.0 / substeps as f32;

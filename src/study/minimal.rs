@@ -446,7 +446,12 @@ fn draw(
         })
         .collect();
     // The shadow of a tool is part of what a scene's shadow is for.
-    let drawn = renderer.draw(&moved, None, &orbit, &session.visible_tools())?;
+    let drawn = renderer.draw(
+        &moved,
+        session.simulation().point_volumes(),
+        &orbit,
+        &session.visible_tools(),
+    )?;
     Ok(drawn.passes.iter().map(|pass| pass.gpu_ms).sum())
 }
 

@@ -10,7 +10,7 @@ use crate::app::slider::{Slider, three};
 use crate::geom::plane::LightPathMethod;
 use crate::passes::frame::{patch_radius_m, tolerance_m};
 use crate::scene::{LightSection, SurfaceKind};
-use crate::sim::Method;
+use crate::sim::{HandOver, Method};
 use egui::{ComboBox, Ui};
 use glam::Vec3;
 
@@ -156,7 +156,7 @@ fn direction(ui: &mut Ui, toward: &mut Vec3) {
 pub fn solver(ui: &mut Ui, session: &mut Session) {
     ui.separator();
     ui.strong("Solver");
-    let taken = session.solver();
+    let (taken, cause) = (session.solver(), session.handed_over_for());
     let solver = &mut session.scene.solver;
     ComboBox::from_label("method")
         .selected_text(solver.method.name())
@@ -174,9 +174,13 @@ pub fn solver(ui: &mut Ui, session: &mut Session) {
     ui.add(Slider::new(&mut solver.substeps, 1..=60).text("substeps"));
     if taken.method != solver.method {
         let (method, substeps) = (taken.method.name(), substeps(taken.substeps));
-        ui.label(format!(
-            "{method} is taken, in {substeps}: the tissue is stiff"
-        ));
+        let why = match cause {
+            Some(HandOver::WavesGrew) => "waves grew in the tissue",
+            Some(HandOver::Trembled) => "the tissue trembled",
+            Some(HandOver::Folded) => "the tissue stayed folded",
+            Some(HandOver::TooStiff) | None => "the tissue is stiff",
+        };
+        ui.label(format!("{method} is taken, in {substeps}: {why}"));
     }
     ui.add(Slider::new(&mut solver.iterations, 1..=10).text("iterations"));
     let step = Slider::new(&mut solver.timestep_s, 1e-3..=0.05).logarithmic(true);

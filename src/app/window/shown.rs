@@ -383,8 +383,14 @@ impl Shown {
             PanelAsk::Open(path) => self.open(&path),
             PanelAsk::Rebuild => self.awaited.rebuild = true,
             PanelAsk::Reload => self.awaited.reload = true,
-            PanelAsk::SurfaceKnobs => self.renderer.set_knobs(&self.session.scene),
-            PanelAsk::Lights => self.renderer.set_lights(&self.session),
+            PanelAsk::SurfaceKnobs => {
+                self.renderer.set_knobs(&self.session.scene);
+                self.light_error.forget();
+            }
+            PanelAsk::Lights => {
+                self.renderer.set_lights(&self.session);
+                self.light_error.forget();
+            }
             PanelAsk::Camera => self.take_camera(),
             PanelAsk::Look(side) => self.look(side),
             PanelAsk::Solver => {

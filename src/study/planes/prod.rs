@@ -19,23 +19,28 @@ const SCENES: [&str; 2] = ["spleen", "liver"];
 /// Frames between two looks, and the last that is looked at: push, slide, pull and release.
 const FRAMES_BETWEEN: u32 = 12;
 const FRAMES: u32 = 168;
-/// What the charts show: `carried`, `sampled` and `incremental` lie on `full`.
-const SHOWN: [&str; 6] = [
-    "tangent",
-    "stale",
-    MOVED_ALONG,
-    "full",
-    "quadric",
-    "depth-map",
+/// What the charts show: all other planes lie on `full`.
+const SHOWN: [LightPathMethod; 5] = [
+    LightPathMethod::Tangent,
+    LightPathMethod::Stale,
+    LightPathMethod::Full,
+    LightPathMethod::Quadric,
+    LightPathMethod::DepthMap,
 ];
+/// Pressed or pulled is what has gone at least this share of the farthest way of any point.
+const PRODDED_SHARE: f32 = 0.5;
+/// Nobody is prodded yet where nothing has gone farther than this share of the organ.
+const PRODDED_SIZES_MIN: f32 = 0.005;
 const CHART_PX: (f64, f64) = (720.0, 360.0);
 
 /// How far off a method is at one time of a script.
 struct Look {
     scene: &'static str,
-    time_s: f32,
+    time_s: f64,
     method: String,
     radiance_error_rel: Option<f64>,
+    /// Where the organ is pressed or pulled; nothing while it is not.
+    prodded_error_rel: Option<f64>,
     with_shadows_error_rel: Option<f64>,
 }
 
@@ -78,14 +83,26 @@ fn follow(bench: &Bench, name: &'static str, sights: u32) -> Result<Vec<Look>, A
         if frame % FRAMES_BETWEEN == 0 {
             let pose: Vec<DVec3> = points.iter().map(|p| p.as_dvec3()).collect();
             let reach_m = f64::from(radius_m);
-            let truth = Truth::new(&body, &pose, reach_m, sights as usize, bench.threads());
+            let mut truth = Truth::new(&body, &pose, reach_m, sights as usize, bench.threads());
+            let ways_m: Vec<f32> = (points.iter().zip(&body.mesh.points))
+                .map(|(now, rest)| now.distance(*rest))
+                .collect();
+            let farthest_m = ways_m.iter().copied().fold(0.0, f32::max);
+            let is_prodded = farthest_m > PRODDED_SIZES_MIN * body.size_m;
+            for sight in &mut truth.sights {
+                let way_m = sight.corners.map(|corner| ways_m[corner as usize]);
+                let way_m = Vec3::from_array(way_m).dot(sight.shares);
+                sight.is_poked = is_prodded && way_m > PRODDED_SHARE * farthest_m;
+            }
+            let time_s = f64::from((100.0 * session.time_s()).round()) / 100.0;
             let mut look = |method: &str, drawn: &Drawn| {
                 let errors = errors_of(&truth, drawn, Blend::Squared);
                 looks.push(Look {
                     scene: name,
-                    time_s: session.time_s(),
+                    time_s,
                     method: method.to_owned(),
                     radiance_error_rel: errors.radiance,
+                    prodded_error_rel: errors.poked,
                     with_shadows_error_rel: errors.shadowed,
                 });
             };
@@ -105,15 +122,18 @@ fn follow(bench: &Bench, name: &'static str, sights: u32) -> Result<Vec<Look>, A
 
 fn csv(looks: &[Look]) -> String {
     let told = |error: Option<f64>| error.map_or_else(String::new, |error| error.to_string());
-    let mut csv = "scene,time_s,method,radiance_error_rel,with_shadows_error_rel\n".to_owned();
+    let mut csv =
+        "scene,time_s,method,radiance_error_rel,prodded_error_rel,with_shadows_error_rel\n"
+            .to_owned();
     for look in looks {
         writeln!(
             csv,
-            "{},{},\"{}\",{},{}",
+            "{},{},\"{}\",{},{},{}",
             look.scene,
             look.time_s,
             look.method,
             told(look.radiance_error_rel),
+            told(look.prodded_error_rel),
             told(look.with_shadows_error_rel)
         )
         .expect("a string takes all that is written to it");
@@ -125,15 +145,20 @@ fn csv(looks: &[Look]) -> String {
 fn chart(looks: &[&Look]) -> LineChart {
     let mut series: Vec<Series> = Vec::new();
     for look in looks {
-        let shown = SHOWN.contains(&look.method.as_str());
-        let Some(error) = look.radiance_error_rel.filter(|_| shown) else {
+        let method = SHOWN.iter().find(|method| method.name() == look.method);
+        let Some((method, error)) = method.zip(look.radiance_error_rel) else {
             continue;
         };
-        let point = (f64::from(look.time_s), 100.0 * error);
+        let point = (look.time_s, 100.0 * error);
         match series.iter_mut().find(|line| line.label == look.method) {
             Some(line) => line.points.push(point),
             None => series.push(Series {
                 label: look.method.clone(),
+                // As in the other charts of the study.
+                look: LightPathMethod::ALL
+                    .iter()
+                    .position(|m| m == method)
+                    .unwrap_or(0),
                 points: vec![point],
             }),
         }
@@ -154,11 +179,12 @@ mod tests {
 
     #[test]
     fn looks_are_told_a_line_each_and_drawn_a_line_a_method() {
-        let look = |time_s: f32, method: &str, error| Look {
+        let look = |time_s: f64, method: &str, error| Look {
             scene: "spleen",
             time_s,
             method: method.to_owned(),
             radiance_error_rel: error,
+            prodded_error_rel: None,
             with_shadows_error_rel: None,
         };
         let looks = [
@@ -168,12 +194,12 @@ mod tests {
         ];
         let csv = csv(&looks);
         assert_eq!(csv.lines().count(), 4);
-        assert!(csv.contains("spleen,0.2,\"stale, moved along\",,"), "{csv}");
+        assert!(
+            csv.contains("spleen,0.2,\"stale, moved along\",,,"),
+            "{csv}"
+        );
         let chart = chart(&looks.iter().collect::<Vec<_>>());
         assert_eq!(chart.series.len(), 1);
-        assert_eq!(
-            chart.series[0].points,
-            [(0.0, 10.0), (f64::from(0.2_f32), 12.0)]
-        );
+        assert_eq!(chart.series[0].points, [(0.0, 10.0), (0.2, 12.0)]);
     }
 }

@@ -168,16 +168,12 @@ fn share_name(share: f64) -> String {
 /// A chart of all deformations together and one of each: title and itself.
 fn charts(rows: &[&PlanesRow]) -> Vec<(String, ScatterChart)> {
     let deformations = distinct(rows.iter().map(|row| row.cell.deformation));
-    let together = chart(
-        rows,
-        "moved, mean",
-        |method, radius, measure| {
-            Some((
-                median_ms(rows, method, radius),
-                mean(rows, method, radius, measure)?,
-            ))
-        },
-    );
+    let together = chart(rows, "moved, mean", |method, radius, measure| {
+        Some((
+            median_ms(rows, method, radius),
+            mean(rows, method, radius, measure)?,
+        ))
+    });
     let each = deformations.into_iter().map(|deformation| {
         chart(rows, deformation.name(), |method, radius, measure| {
             let measures = &row_of(rows, method, deformation, radius)?.measures;

@@ -134,6 +134,13 @@ impl Sweep for Pokes {
                 "tool.speed_m_s = {speed} is out of range: choose from 0.001 to 100"
             ));
         }
+        for (key, count) in [("batches", plan.tool.batches), ("pokes", plan.tool.pokes)] {
+            if count == 0 {
+                return Err(format!(
+                    "tool.{key} = 0 leaves nothing to do: choose 1 or more"
+                ));
+            }
+        }
         let mut cells = Vec::new();
         for scene in &plan.body.scene {
             for &method in &plan.solver.method {
@@ -200,6 +207,9 @@ mod tests {
         let mut plan = Pokes::plan(true);
         plan.tool.speed_m_s = vec![0.0];
         assert!(Pokes::cells(&plan).unwrap_err().contains("0.001 to 100"));
+        plan.tool.pokes = 0;
+        plan.tool.speed_m_s = vec![1.0];
+        assert!(Pokes::cells(&plan).unwrap_err().contains("tool.pokes"));
         plan.body.cell_share = f64::NAN;
         assert!(Pokes::cells(&plan).unwrap_err().contains("0.01 to 0.5"));
     }
