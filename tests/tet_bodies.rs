@@ -433,6 +433,44 @@ fn poor_tetrahedra_that_tremble_or_stay_folded_are_handed_over_which_is_said_and
     }
 }
 
+/// A ball that comes to rest 4 mm deep in the top of the organ and stays.
+const RESTING_BALL: &str = "
+[[tool]]
+name = \"ball\"
+radius_m = 0.01
+approach = { from_share = [0.5, 0.5, 1.6], toward_share = [0.5, 0.5, 0.5] }
+keys = [
+    { at_s = 0.0, depth_m = -0.004, action = \"push\" },
+    { at_s = 0.2, depth_m = 0.004, action = \"push\" },
+]
+";
+
+#[test]
+fn poor_tetrahedra_tremble_under_a_resting_tool_and_under_heavy_damping_too_and_are_handed_over() {
+    let pressed = format!("{ORGAN}{RESTING_BALL}");
+    for (text, sets) in [
+        (
+            pressed.as_str(),
+            ["solver.substeps=52", "body.damping_per_s=10"],
+        ),
+        (ORGAN, ["solver.substeps=52", "body.damping_per_s=60"]),
+    ] {
+        let mut session = session(text, &sets).expect("a sound scene");
+        assert_eq!(session.solver(), session.scene.solver, "{sets:?}");
+        let mut report = session.tick().report;
+        for _ in 0..300 {
+            report = session.tick().report;
+        }
+        assert_eq!(session.solver().method, Method::Implicit, "{sets:?}");
+        assert!(report.speed_max_m_s < 1e-3, "{sets:?}: {report:?}");
+        let is_pressed = report
+            .tool_forces_n
+            .iter()
+            .any(|force| force.length() > 0.05);
+        assert_eq!(is_pressed, text != ORGAN, "{report:?}");
+    }
+}
+
 #[test]
 fn pressed_tissue_is_not_taken_for_trembling() {
     let mut session = session(include_str!("../scenes/slab.toml"), &[]).expect("a sound scene");
