@@ -1,5 +1,5 @@
 //! Where each light enters the body: a depth map a light, side by side, with the surface's normal at each entry. One
-//! draw a light and frame.
+//! draw a light, in frames in which the surface or a light has moved.
 //!
 //! The first map is the shadow map of the light that casts shadows: a scene with both draws it once.
 
@@ -12,6 +12,7 @@ use crate::geom::SurfaceMesh;
 use crate::gpu::{Binding, Gpu, GpuError, Timer, Wgsl, join, uniform};
 use crate::scene::{LIGHTS_MAX, PlacedLight};
 use glam::{Mat4, Vec3};
+use std::cell::RefCell;
 
 /// Mirror of `LightViews` in `shaders/light_depth.wgsl`.
 #[repr(C)]
@@ -33,6 +34,8 @@ pub struct DepthMaps {
     pub normals: Target,
     /// What the surface shader needs to read them, [`LightViews`].
     pub views: wgpu::Buffer,
+    /// What they were last drawn of.
+    drawn: RefCell<(Vec<PlacedLight>, Vec<Vec3>)>,
 }
 
 impl DepthMaps {
@@ -97,10 +100,12 @@ impl DepthMaps {
             depth: Target::new(gpu, Self::NAME, size, super::DEPTH_FORMAT),
             normals: Target::new(gpu, "entry normals", size, NORMAL_FORMAT),
             views: uniform(gpu, Self::NAME, &views(&[], &[])),
+            drawn: RefCell::default(),
         })
     }
 
-    /// Adds the draws to `encoder`, with the surface at `points`.
+    /// Adds the draws to `encoder`, with the surface at `points`; none where the maps are those of these lights and
+    /// points already.
     pub fn record(
         &self,
         gpu: &Gpu,
@@ -110,6 +115,13 @@ impl DepthMaps {
         encoder: &mut wgpu::CommandEncoder,
         timer: &mut Timer,
     ) {
+        {
+            let (of_lights, of_points) = &mut *self.drawn.borrow_mut();
+            if of_lights == lights && of_points == points {
+                return;
+            }
+            (*of_lights, *of_points) = (lights.to_vec(), points.to_vec());
+        }
         let views = views(lights, points);
         gpu.queue
             .write_buffer(&self.views, 0, bytemuck::bytes_of(&views));

@@ -224,3 +224,30 @@ fn far_light(toward: Vec3) -> PlacedLight {
         shadow: false,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::body::Shape;
+    use super::*;
+
+    #[test]
+    fn maps_of_a_still_body_are_not_drawn_again_and_those_of_a_moved_one_are() {
+        let gpu = Gpu::headless().expect("an adapter, such as mesa-vulkan-drivers");
+        if !gpu.has_timestamps {
+            println!("no timestamps on this adapter: not run");
+            return;
+        }
+        let body = Body::of_shape(Shape::Blob, 600, 0.1);
+        let knobs = knobs(LightPathMethod::DepthMap, 0.01, 0.0);
+        let mut stage = Stage::new(&gpu, &body, knobs, Vec3::ZERO).expect("it builds");
+        let mut points = body.mesh.points.clone();
+        let mut drawn = |points: &[Vec3]| {
+            let times = stage.frame(points).expect("times can be read");
+            times.refit.expect("there are timestamps") > 0.0
+        };
+        assert!(drawn(&points));
+        assert!(!drawn(&points), "nothing has moved");
+        points[0].x += 1e-3;
+        assert!(drawn(&points));
+    }
+}
