@@ -47,6 +47,18 @@ pub struct Point {
     pub scale: f64,
 }
 
+/// A range that holds all positive values, with so much room before and beyond them, as factors.
+pub fn range_around(values: impl Iterator<Item = f64>, room: [f64; 2]) -> (f64, f64) {
+    let positive = values.filter(|value| *value > 0.0 && value.is_finite());
+    let (low, high) = positive.fold((f64::MAX, 0.0_f64), |(low, high), value| {
+        (low.min(value), high.max(value))
+    });
+    if low > high {
+        return (0.1, 10.0);
+    }
+    (low / room[0], high * room[1])
+}
+
 /// Points over two logarithmic axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScatterChart {

@@ -133,13 +133,8 @@ impl Contacts {
 
     /// The particles that carry what the tool touches.
     pub fn carriers(&self) -> impl Iterator<Item = u32> {
-        let handles = self.touches.iter().map(|touch| touch.handle);
-        handles.flat_map(|handle| {
-            handle
-                .carriers()
-                .map(|(particle, _)| particle)
-                .collect::<Vec<_>>()
-        })
+        let handles = self.touches.iter().map(|touch| &touch.handle);
+        handles.flat_map(|handle| handle.carriers().map(|(particle, _)| particle))
     }
 
     /// Number of active contacts.

@@ -199,16 +199,13 @@ impl Cover<'_> {
                         tangent_light,
                         plane_light,
                     ),
-                    Blend::Published => {
-                        let (way, cosine) = light_plane::way_as_printed(
-                            &pair,
-                            t,
-                            share,
-                            tangent_light,
-                            plane_light,
-                        );
-                        Some((way, cosine))
-                    }
+                    Blend::Published => Some(light_plane::way_as_printed(
+                        &pair,
+                        t,
+                        share,
+                        tangent_light,
+                        plane_light,
+                    )),
                 }
             }
             Self::Quadric { normal, quadric } => {

@@ -7,7 +7,7 @@ use super::{Cell, Measures};
 use crate::geom::plane::LightPathMethod;
 use crate::measure::chart::{number, three_digits};
 use crate::measure::page::{Block, Table};
-use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
+use crate::measure::scatter::{Cloud, Point, ScatterChart, range_around, sheet};
 use crate::measure::stats::Stats;
 
 type PlanesRow = Row<Cell, Measures>;
@@ -19,7 +19,7 @@ pub const MOVED_ALONG: &str = "stale, moved along";
 /// Where a method without a pass stands [ms].
 const NO_PASS_MS: f64 = 0.004;
 /// Room beyond the smallest and the largest value of the charts.
-const ROOM: f64 = 1.6;
+const ROOM: [f64; 2] = [1.6; 2];
 /// The size of mesh that charts show, or what is nearest to it.
 const SHOWN_VERTICES: u32 = 10_000;
 
@@ -33,12 +33,14 @@ pub fn findings(rows: &[PlanesRow]) -> Findings {
     };
     let shown: Vec<&PlanesRow> = rows.iter().filter(|row| of_body(row, &shown)).collect();
     let mut charts = charts(&shown);
-    let ranges = [
-        ranges(&charts, |point| Some(point.x)),
-        ranges(&charts, |point| point.y),
-    ];
+    let points = || {
+        let clouds = charts.iter().flat_map(|(_, chart)| &chart.clouds);
+        clouds.flat_map(|cloud| &cloud.points)
+    };
+    let x_range = range_around(points().map(|point| point.x), ROOM);
+    let y_range = range_around(points().filter_map(|point| point.y), ROOM);
     for (_, chart) in &mut charts {
-        (chart.x_range, chart.y_range) = (ranges[0], ranges[1]);
+        (chart.x_range, chart.y_range) = (x_range, y_range);
     }
     let charts: Vec<(String, String)> = (charts.into_iter())
         .map(|(title, chart)| (title, chart.svg()))
@@ -181,21 +183,6 @@ fn charts(rows: &[&PlanesRow]) -> Vec<(String, ScatterChart)> {
         })
     });
     std::iter::once(together).chain(each).collect()
-}
-
-/// A range that holds all values of `of`, with room at both ends.
-fn ranges(charts: &[(String, ScatterChart)], of: impl Fn(&Point) -> Option<f64>) -> (f64, f64) {
-    let clouds = charts.iter().flat_map(|(_, chart)| &chart.clouds);
-    let values = clouds.flat_map(|cloud| &cloud.points).filter_map(of);
-    let positive = values.filter(|value| *value > 0.0 && value.is_finite());
-    let (low, high) = positive.fold((f64::MAX, 0.0_f64), |(low, high), value| {
-        (low.min(value), high.max(value))
-    });
-    if low > high {
-        (0.1, 100.0)
-    } else {
-        (low / ROOM, high * ROOM)
-    }
 }
 
 /// A number of a row's measures.

@@ -7,7 +7,7 @@ use super::super::sweep::Row;
 use super::{Cell, Measures};
 use crate::measure::chart::{number, three_digits};
 use crate::measure::page::{Block, Table};
-use crate::measure::scatter::{Cloud, Point, ScatterChart, sheet};
+use crate::measure::scatter::{Cloud, Point, ScatterChart, range_around, sheet};
 use crate::sim::SolverParams;
 
 type SolverRow = Row<Cell, Measures>;
@@ -18,6 +18,8 @@ const COLUMNS: usize = 2;
 /// What the charts show of the settled and of the swing error [%].
 const SETTLED_RANGE: (f64, f64) = (1e-5, 200.0);
 const SWING_RANGE: (f64, f64) = (0.05, 200.0);
+/// Room before the shortest time and beyond the longest.
+const ROOM: [f64; 2] = [1.5, 1.8];
 /// Errors that a user may ask for, of which the cheapest setting is told.
 const BOUNDS: [f64; 4] = [0.02, 0.005, 0.001, 0.0001];
 /// Speed that is rest [m/s].
@@ -276,22 +278,10 @@ fn chart(
         title: body.name(),
         x_label: "processor time of a frame, one core [ms]".to_owned(),
         y_label: y_label.to_owned(),
-        x_range: around(times),
+        x_range: range_around(times, ROOM),
         y_range,
         clouds,
     }
-}
-
-/// A range that holds all values, with room at both ends.
-fn around(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let positive = values.filter(|value| *value > 0.0 && value.is_finite());
-    let (low, high) = positive.fold((f64::MAX, 0.0_f64), |(low, high), value| {
-        (low.min(value), high.max(value))
-    });
-    if low > high {
-        return (0.1, 10.0);
-    }
-    (low / 1.5, high * 1.8)
 }
 
 /// The cheapest setting for each bound, ours and that of another program.
