@@ -17,7 +17,7 @@ mod nearest;
 mod sweep;
 mod touch;
 
-pub use inside::{is_inside, way_out};
+pub use inside::{reaches_inside, way_out};
 pub use near::{Surface, SweptBox};
 
 use super::{
@@ -444,7 +444,7 @@ impl Contacts {
         moved_m
     }
 
-    /// How far a tool at `position_m`, outside the surface, reaches into it at most [m].
+    /// How far a tool at `position_m` reaches into the surface at most [m], if its axis is outside.
     pub fn penetration_m(&self, shape: ToolShape, position_m: Vec3, points: &[Vec3]) -> f32 {
         let depth_m = |near: &Near| {
             let corners = near.corners.map(|k| {

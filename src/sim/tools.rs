@@ -32,8 +32,8 @@ struct Tool {
     /// Where it was when the step started, and where it will be when it ends [m].
     from_m: Vec3,
     to_m: Vec3,
-    /// How far what touches the body is from there [m]: a tool found inside the body is taken to be
-    /// outside the nearest part of its surface, and comes in from there.
+    /// How far what touches the body is from there [m]: a tool found inside the body, or with a part of
+    /// its shaft, is taken to be outside the nearest part of its surface, and comes in from there.
     behind_m: Vec3,
     /// Whether it is known to be outside, or else where outside it is taken to be.
     side_known: bool,
@@ -419,13 +419,14 @@ impl Tool {
             self.side_known = false;
         }
         if !self.side_known || is_behind {
+            let axis = self.axis_at(self.from_m);
             let (low, high) = body.surface.bounds;
             let (points, triangles) = (body.surface.points, body.surface.triangles);
-            let inside = self.from_m.cmpge(low).all()
-                && self.from_m.cmple(high).all()
-                && contact::is_inside(self.from_m, points, triangles);
+            let inside = axis[0].max(axis[1]).cmpge(low).all()
+                && axis[0].min(axis[1]).cmple(high).all()
+                && contact::reaches_inside(axis, points, triangles);
             if inside && !is_behind {
-                let way = contact::way_out(self.from_m, body.surface, &body.particles.places);
+                let way = contact::way_out(axis, body.surface, &body.particles.places);
                 let way = way.unwrap_or_default();
                 self.behind_m = way + radius_m * way.normalize_or_zero();
             } else if !inside && self.behind_m.length() > radius_m {
@@ -445,13 +446,22 @@ impl Tool {
             return 0.0;
         }
         let (shape, at_m) = (self.input.shape, self.input.position_m);
-        if self.behind_m != Vec3::ZERO
-            && contact::is_inside(at_m, surface.points, surface.triangles)
+        let reached_m = self.contacts.penetration_m(shape, at_m, surface.points);
+        // Distances have no sign: a tool that is in to its axis looks as if it were on its way out.
+        let is_deep = reached_m > shape.radius_m() / 2.0;
+        let axis = self.axis_at(at_m);
+        if (is_deep || self.behind_m != Vec3::ZERO)
+            && contact::reaches_inside(axis, surface.points, surface.triangles)
         {
-            let way = contact::way_out(at_m, surface, &particles.places);
+            let way = contact::way_out(axis, surface, &particles.places);
             return shape.radius_m() + way.unwrap_or_default().length();
         }
-        self.contacts.penetration_m(shape, at_m, surface.points)
+        reached_m
+    }
+
+    /// The ends of its axis when it is at `position_m` [m].
+    fn axis_at(&self, position_m: Vec3) -> [Vec3; 2] {
+        [position_m, position_m + self.input.shape.axis_m()]
     }
 
     fn pushes(&self) -> bool {

@@ -8,10 +8,11 @@ mod show;
 pub use script::Measures;
 
 use super::Study;
+use super::contender::Contender;
 use super::findings::Findings;
 use super::sweep::{Row, Sweep};
 use crate::app::{AppError, LoadedBody, load_body, load_scene};
-use crate::sim::{Method, SolverParams};
+use crate::sim::SolverParams;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::path::Path;
@@ -39,7 +40,7 @@ pub struct BodyPlan {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolverPlan {
-    pub method: Vec<Method>,
+    pub method: Vec<Contender>,
 }
 
 /// The pokes.
@@ -77,7 +78,7 @@ impl Shape {
 pub struct Cell {
     pub scene: String,
     pub cell_share: f64,
-    pub method: Method,
+    pub method: Contender,
     pub shape: Shape,
     pub speed_m_s: f64,
     pub batch: u32,
@@ -110,7 +111,7 @@ impl Sweep for Pokes {
                 cell_share: 0.08,
             },
             solver: SolverPlan {
-                method: vec![SolverParams::default().method],
+                method: vec![Contender::AsAScene],
             },
             tool: ToolPlan {
                 shape: vec![Shape::Ball, Shape::Rod],
@@ -180,7 +181,7 @@ impl Sweep for Pokes {
     fn measure(&self, cell: &Cell) -> Result<Row<Cell, Measures>, AppError> {
         let organ = &self.organs[&cell.scene];
         let params = SolverParams {
-            method: cell.method,
+            method: cell.method.method(),
             ..organ.params
         };
         script::run(cell, &organ.body, params)

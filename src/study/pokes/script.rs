@@ -1,5 +1,6 @@
 //! One simulation: poke after poke at random places, each looked at when it is over.
 
+use super::super::contender::Contender;
 use super::super::random::Random;
 use super::super::sweep::{Cost, Row, State, Verdict, finite};
 use super::super::timing::{Clock, Times};
@@ -26,16 +27,22 @@ const TILT_MAX: f32 = 0.58;
 /// Frames at the deepest place, and after the tool has left.
 const HOLD_FRAMES: u32 = 6;
 const AFTER_FRAMES: u32 = 40;
+/// Frames in which a body comes to rest before the first poke and after the last.
+const REST_FRAMES: u32 = 180;
 /// A slow tool is withdrawn faster than it came [m/s].
 const WITHDRAWAL_MIN_M_S: f32 = 0.1;
 /// Places that are tried for one poke.
 const TRIES_MAX: u32 = 1000;
 const FRICTION: f32 = 0.3;
-/// Length of the axis of a rod, in radii, and places on it at which its depth is looked at.
+/// Length of the axis of a rod, in radii.
 const ROD_RADII: f32 = 4.0;
-const ROD_LOOKS: u32 = 5;
 /// Share of the thickness from which on a tool is inside: the goal, and what nobody would overlook.
 const PENETRATION_BOUNDS: [f64; 2] = [0.01, 0.1];
+/// Share of the extent from which on a body is not back at rest: what a pixel would tell, and what
+/// nobody would overlook.
+const OFF_REST_BOUNDS: [f64; 2] = [0.001, 0.01];
+/// Speed left that is not rest [m/s].
+const SPEED_LEFT_MAX_M_S: f64 = 1e-3;
 
 /// What is measured of the pokes of a cell.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -47,7 +54,7 @@ pub struct Measures {
     pub not_finite: u32,
     /// Pokes after which tetrahedra stay inverted.
     pub lasting_inversions: u32,
-    /// Pokes in which the middle of the tool was inside the surface after any frame.
+    /// Pokes in which a part of the tool's axis was inside the surface after any frame.
     pub tunnelled: u32,
     /// Pokes in which the tool reached deeper into the surface than 1 % of the thickness.
     pub too_deep: u32,
@@ -58,6 +65,9 @@ pub struct Measures {
     pub inverted_tets: usize,
     /// Largest force on the tool [N].
     pub force_max_n: Option<f64>,
+    /// How far a point is from where it was before the first poke at most, once the body has come to
+    /// rest, as a share of the longest extent.
+    pub off_rest_share: Option<f64>,
     /// Fastest particle at the end [m/s].
     pub speed_left_m_s: Option<f64>,
 }
@@ -90,6 +100,7 @@ pub fn run(
     let mut simulation = Simulation::new(body.setup.clone(), params);
     // Cells are measured side by side, each on a thread.
     simulation.set_threads(Some(1));
+    cell.method.start(&mut simulation, params);
     let mut random = Random::new(seed(cell));
     let mut times = Times::default();
     let mut measures = Measures {
@@ -97,13 +108,22 @@ pub fn run(
         oracle: "invariants".to_owned(),
         ..Measures::default()
     };
-    let places = Places::new(body, simulation.points());
+    rest(&mut simulation, cell.method);
+    let at_rest = simulation.points().to_vec();
+    let places = Places::new(body, &at_rest);
     for _ in 0..cell.pokes {
         let poke = places.choose(cell.shape, &mut random).ok_or_else(|| {
             AppError::Body(format!("{}: no place on it can be poked", cell.scene))
         })?;
         let frozen_before = simulation.report().frozen_particles;
-        let watched = poke_once(&mut simulation, &places, &poke, cell.speed_m_s, &mut times);
+        let watched = poke_once(
+            &mut simulation,
+            cell.method,
+            &places,
+            &poke,
+            cell.speed_m_s,
+            &mut times,
+        );
         let report = simulation.report();
         measures.not_finite += u32::from(report.frozen_particles > frozen_before);
         measures.lasting_inversions += u32::from(report.inverted_tets > 0);
@@ -119,6 +139,14 @@ pub fn run(
             .max(f64::from(watched.force_max_n));
         measures.force_max_n = finite(force);
     }
+    rest(&mut simulation, cell.method);
+    let off_m = (simulation.points().iter().zip(&at_rest))
+        .map(|(x, rest)| x.distance(*rest))
+        .fold(
+            0.0,
+            |worst: f32, off| if off >= worst { off } else { off.max(worst) },
+        );
+    measures.off_rest_share = finite(f64::from(off_m / places.extent_m));
     let report = simulation.report();
     measures.inverted_tets = report.inverted_tets;
     measures.speed_left_m_s = finite(f64::from(report.speed_max_m_s));
@@ -132,6 +160,14 @@ pub fn run(
             ms_p95: wall.map(|(_, p95)| p95),
         },
     })
+}
+
+/// Lets the body come to rest by itself.
+fn rest(simulation: &mut Simulation, contender: Contender) {
+    for _ in 0..REST_FRAMES {
+        simulation.step(&[]);
+        contender.after_step(simulation);
+    }
 }
 
 /// Another one for every cell, and the same one wherever it is measured.
@@ -161,16 +197,12 @@ impl Poke {
 
     /// How deep the tool with its tip at `tip_m` reaches into the surface [m], negative where it does not.
     fn depth_m(&self, tip_m: Vec3, points: &[Vec3], triangles: &[[u32; 3]]) -> f64 {
-        let looks = match self.shape() {
-            ToolShape::Sphere { .. } => 1,
-            ToolShape::Capsule { .. } => ROD_LOOKS,
-        };
-        (0..looks)
-            .map(|look| {
-                let middle = tip_m + (look as f32 / (ROD_LOOKS - 1) as f32) * self.axis_m;
-                depth_m(middle, self.radius_m, points, triangles)
-            })
-            .fold(f64::NEG_INFINITY, f64::max)
+        depth_m(
+            [tip_m, tip_m + self.axis_m],
+            self.radius_m,
+            points,
+            triangles,
+        )
     }
 }
 
@@ -185,6 +217,7 @@ struct Watched {
 
 fn poke_once(
     simulation: &mut Simulation,
+    contender: Contender,
     places: &Places,
     poke: &Poke,
     speed_m_s: f64,
@@ -202,11 +235,12 @@ fn poke_once(
         let clock = Clock::start();
         let report = simulation.step(&[tool]);
         times.add(clock);
+        contender.after_step(simulation);
         if action == ToolAction::Push {
             let points = simulation.points();
             let depth_m = poke.depth_m(tool.position_m, points, places.triangles);
             watched.penetration_m = watched.penetration_m.max(depth_m);
-            watched.tunnelled |= depth_m > f64::from(poke.radius_m);
+            watched.tunnelled |= depth_m >= f64::from(poke.radius_m);
         }
         watched.force_max_n = watched.force_max_n.max(report.tool_forces_n[0].length());
         watched.inverted_tets_max = watched.inverted_tets_max.max(report.inverted_tets);
@@ -315,7 +349,7 @@ fn verdict(m: &Measures) -> Verdict {
     };
     count(m.not_finite, "not finite");
     count(m.lasting_inversions, "left tetrahedra inverted");
-    count(m.tunnelled, "with the middle of the tool inside");
+    count(m.tunnelled, "with the axis of the tool inside");
     let share = m.penetration_share_max.unwrap_or(f64::INFINITY);
     if share > PENETRATION_BOUNDS[0] {
         let state = if share > PENETRATION_BOUNDS[1] {
@@ -329,6 +363,24 @@ fn verdict(m: &Measures) -> Verdict {
             number(100.0 * share)
         );
         faults.push((state, why));
+    }
+    let off_rest = m.off_rest_share.unwrap_or(f64::INFINITY);
+    if off_rest > OFF_REST_BOUNDS[0] {
+        let state = if off_rest > OFF_REST_BOUNDS[1] {
+            State::Failed
+        } else {
+            State::Degraded
+        };
+        let why = format!(
+            "off its shape at rest by {} % of the extent",
+            number(100.0 * off_rest)
+        );
+        faults.push((state, why));
+    }
+    let left = m.speed_left_m_s.unwrap_or(f64::INFINITY);
+    if left > SPEED_LEFT_MAX_M_S {
+        let why = format!("{} mm/s left after three seconds", number(1e3 * left));
+        faults.push((State::Degraded, why));
     }
     Verdict::of(faults)
 }
@@ -353,7 +405,7 @@ mod tests {
             let poke = places
                 .choose(Shape::Rod, &mut random)
                 .expect("a slab can be poked");
-            let depth = |x: Vec3| depth_m(x, 0.0, &places.points, places.triangles);
+            let depth = |x: Vec3| depth_m([x; 2], 0.0, &places.points, places.triangles);
             assert!(depth(poke.from_m) < -f64::from(poke.radius_m));
             let front = poke.from_m + (poke.way_m + poke.radius_m) * poke.direction;
             assert!(depth(front) > 0.0, "{poke:?}");
@@ -366,7 +418,7 @@ mod tests {
         let cell = |batch| Cell {
             scene: "slab".to_owned(),
             cell_share: 0.25,
-            method: SolverParams::default().method,
+            method: Contender::AsAScene,
             shape: Shape::Rod,
             speed_m_s: 1.0,
             batch,
@@ -388,6 +440,8 @@ mod tests {
     fn verdict_counts_what_must_not_happen() {
         let fine = Measures {
             penetration_share_max: Some(0.001),
+            off_rest_share: Some(1e-5),
+            speed_left_m_s: Some(0.0),
             ..Measures::default()
         };
         assert_eq!(verdict(&fine).state, State::Fine);
@@ -401,6 +455,16 @@ mod tests {
             ..fine.clone()
         };
         assert_eq!(verdict(&deep).state, State::Degraded);
+        let bent = Measures {
+            off_rest_share: Some(0.02),
+            ..fine.clone()
+        };
+        assert_eq!(verdict(&bent).state, State::Failed);
+        let restless = Measures {
+            speed_left_m_s: Some(0.01),
+            ..fine.clone()
+        };
+        assert_eq!(verdict(&restless).state, State::Degraded);
         let lost = Measures {
             penetration_share_max: None,
             ..fine

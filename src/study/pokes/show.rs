@@ -25,7 +25,7 @@ pub fn findings(rows: &[PokesRow]) -> Findings {
                 svg,
                 caption: "Deepest that the tool reached into the surface over all pokes of a speed, as a share of the \
                           thickness under the tool. The goal is 1 %. Crosses at the top: speeds at which a \
-                          poke was not finite, left tetrahedra inverted, or had the middle of the tool inside."
+                          poke was not finite, left tetrahedra inverted, or had a part of the tool's axis inside."
                     .to_owned(),
             },
             Block::Table(table(&groups)),
@@ -95,8 +95,8 @@ fn lead(rows: &[PokesRow]) -> String {
         .filter(|row| row.verdict.state == State::Failed)
         .count();
     format!(
-        "{pokes} pokes in {} simulations: {} not finite, {} left tetrahedra inverted, {} had the middle of \
-         the tool inside, {} reached deeper into the surface than 1 % of the thickness. {failed} simulations failed.",
+        "{pokes} pokes in {} simulations: {} not finite, {} left tetrahedra inverted, {} had a part of the \
+         tool's axis inside, {} reached deeper into the surface than 1 % of the thickness. {failed} simulations failed.",
         rows.len(),
         sum(&|m| m.not_finite),
         sum(&|m| m.lasting_inversions),
@@ -153,6 +153,7 @@ fn table(groups: &[Group]) -> Table {
         "tool inside",
         "over 1 %",
         "deepest %",
+        "off rest %",
         "force N",
         "ms p50",
         "ms p95",
@@ -175,6 +176,7 @@ fn table(groups: &[Group]) -> Table {
             group.sum(|m| m.tunnelled).to_string(),
             group.sum(|m| m.too_deep).to_string(),
             three_digits(100.0 * group.deepest()),
+            largest(&|row| row.measures.off_rest_share.map(|share| 100.0 * share)),
             largest(&|row| row.measures.force_max_n),
             largest(&|row| row.cost.ms_p50),
             largest(&|row| row.cost.ms_p95),

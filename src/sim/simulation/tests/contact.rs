@@ -164,6 +164,53 @@ fn ball_that_appears_inside_is_let_out_gently_on_the_nearest_side() {
     assert_eq!(simulation.report().inverted_tets, 0);
 }
 
+/// A rod of 3 mm through the slab, 12 mm below its top, with both ends outside.
+fn skewer(action: ToolAction) -> ToolInput {
+    ToolInput {
+        shape: ToolShape::Capsule {
+            radius_m: 0.003,
+            axis_m: 0.16 * Vec3::X,
+        },
+        ..tool(0.003, Vec3::new(-0.03, 0.018, 0.042), action)
+    }
+}
+
+#[test]
+fn rod_that_appears_with_its_ends_outside_and_its_shaft_inside_is_let_out_gently() {
+    for method in [Method::XpbdNeoHookean, Method::Implicit] {
+        let mut simulation = Simulation::new(slab(), soft(method));
+        let rod = skewer(ToolAction::Push);
+        let first = simulation.step(&[rod]);
+        // Up to its lower side it is 15 mm deep, of which it comes in by 8.3 in a step.
+        let deep_m = 0.015 - 0.5 / 60.0;
+        assert!(
+            (first.penetration_max_m - deep_m).abs() < 1.5e-3,
+            "{} m deep",
+            first.penetration_max_m
+        );
+        let mut fastest_m_s = first.speed_max_m_s;
+        for _ in 0..40 {
+            fastest_m_s = fastest_m_s.max(simulation.step(&[rod]).speed_max_m_s);
+            assert!(all_finite(&simulation));
+        }
+        assert!(fastest_m_s < 1.0, "{fastest_m_s} m/s");
+        for share in [0.27, 0.47, 0.66] {
+            let place = rod.position_m + share * rod.shape.axis_m();
+            assert!(
+                surface_is_ahead(&simulation, tool(0.003, place, rod.action), Vec3::NEG_Y),
+                "{method:?}: still inside at {share}"
+            );
+        }
+        let report = simulation.report();
+        assert!(
+            report.penetration_max_m < 1e-4,
+            "{} m",
+            report.penetration_max_m
+        );
+        assert_eq!(report.inverted_tets, 0);
+    }
+}
+
 /// A block lies on a ball so large that it is nearly flat, and then gravity is tilted. Friction over
 /// pressure in the next steps, once the block has given way to its own shear, and how fast it goes
 /// after `SLOPE_STEPS` [m/s].
