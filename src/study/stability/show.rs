@@ -4,7 +4,7 @@ use super::super::contender::Contender;
 use super::super::findings::Findings;
 use super::super::sweep::{Row, State, Sweep};
 use super::fault::Fault;
-use super::{Cell, Kind, Measures, Mesh, Stability, Start, base, departures};
+use super::{Cell, Deed, Kind, Measures, Mesh, Stability, Start, base, departures};
 use crate::measure::chart::{number, three_digits};
 use crate::measure::map::{MapChart, Panel, Tile};
 use crate::measure::page::{Block, Table};
@@ -19,7 +19,7 @@ const LISTED_MAX: usize = 40;
 pub fn findings(rows: &[StabilityRow]) -> Findings {
     let maps = [
         map_of_moduli_and_substeps(rows),
-        map_of_pokes(rows),
+        map_of_touches(rows),
         map_of_starts(rows),
         map_of_ratios(rows),
     ];
@@ -28,13 +28,13 @@ pub fn findings(rows: &[StabilityRow]) -> Findings {
     let mut blocks = vec![Block::Paragraph(lead(rows))];
     blocks.extend(maps.iter().map(|map| Block::Chart {
         svg: map.svg(),
-        caption: "Each tile is the worst of the cells at its two values; pokes and wrecks with nothing else \
+        caption: "Each tile is the worst of the cells at its two values; tools and wrecks with nothing else \
                   changed. Nothing was measured where there is no tile."
             .to_owned(),
     }));
     blocks.push(Block::Paragraph(
         "The envelope: the largest modulus up to which no cell failed, for so many substeps or more, whatever \
-         the other knobs (mesh, Poisson's ratio, time step, poke speed, start); with the number of cells in \
+         the other knobs (mesh, Poisson's ratio, time step, damping, tool, start); with the number of cells in \
          it."
             .to_owned(),
     ));
@@ -212,32 +212,38 @@ fn map_of_moduli_and_substeps(rows: &[StabilityRow]) -> Option<MapChart> {
     })
 }
 
-/// Modulus against poke speed.
-fn map_of_pokes(rows: &[StabilityRow]) -> Option<MapChart> {
-    let poked = nothing_else_changed(rows, Kind::Poke, |cell, base| {
-        cell.poke_speed_m_s = base.poke_speed_m_s;
+/// Modulus against the speed of the tool, a row of panels for each thing it does.
+fn map_of_touches(rows: &[StabilityRow]) -> Option<MapChart> {
+    let touched = nothing_else_changed(rows, Kind::Touch, |cell, base| {
+        cell.tool_speed_m_s = base.tool_speed_m_s;
         cell.youngs_modulus_pa = base.youngs_modulus_pa;
     });
-    let speeds = ascending(poked.iter().map(|row| row.cell.poke_speed_m_s));
-    let moduli = moduli(&poked);
-    let panels = |method: Contender| {
-        panel(
-            method.name().to_owned(),
-            &poked,
-            |row| row.cell.method == method,
-            (&speeds, |row| row.cell.poke_speed_m_s),
-            (&moduli, |row| row.cell.youngs_modulus_pa),
-        )
-    };
+    let speeds = ascending(touched.iter().map(|row| row.cell.tool_speed_m_s));
+    let mut deeds: Vec<Deed> = distinct(touched.iter().map(|row| row.cell.deed));
+    deeds.sort_unstable();
+    let moduli = moduli(&touched);
     let methods = methods(rows);
-    (!poked.is_empty()).then(|| MapChart {
-        title: "Poked bodies: modulus against speed of the tool".to_owned(),
+    let panels = deeds.into_iter().flat_map(|deed| {
+        let (touched, speeds, moduli) = (&touched, &speeds, &moduli);
+        methods.iter().map(move |&method| {
+            panel(
+                format!("{}, {}", method.name(), deed.name()),
+                touched,
+                |row| (row.cell.method, row.cell.deed) == (method, deed),
+                (speeds, |row| row.cell.tool_speed_m_s),
+                (moduli, |row| row.cell.youngs_modulus_pa),
+            )
+        })
+    });
+    let panels: Vec<Panel> = panels.collect();
+    (!touched.is_empty()).then(|| MapChart {
+        title: "Bodies under a tool: modulus against its speed".to_owned(),
         x_label: "speed [m/s]".to_owned(),
         columns: words(&speeds),
         y_label: "E [Pa]".to_owned(),
         rows: words(&moduli),
         panels_across: methods.len(),
-        panels: methods.into_iter().map(panels).collect(),
+        panels,
     })
 }
 
@@ -307,7 +313,7 @@ fn map_of_ratios(rows: &[StabilityRow]) -> Option<MapChart> {
 fn envelope(rows: &[StabilityRow]) -> Table {
     let mut substeps = distinct(rows.iter().map(|row| row.cell.substeps));
     substeps.sort_unstable();
-    let kinds = [Kind::Hang, Kind::Poke, Kind::Wreck];
+    let kinds = [Kind::Hang, Kind::Touch, Kind::Wreck];
     let mut lines = Vec::new();
     for method in methods(rows) {
         for &at_least in &substeps {
@@ -332,7 +338,7 @@ fn envelope(rows: &[StabilityRow]) -> Table {
             "method",
             "substeps ≥",
             "hangs or stands",
-            "poked",
+            "under a tool",
             "wrecked",
         ],
         lines,
@@ -468,9 +474,9 @@ fn failed_of_default(rows: &[StabilityRow]) -> Table {
         |row: &&StabilityRow| row.cell.method == default && row.verdict.state == State::Failed;
     let line = |row: &StabilityRow| {
         let cell = &row.cell;
-        let poke = match cell.poke_speed_m_s {
+        let tool = match cell.tool_speed_m_s {
             0.0 => String::new(),
-            speed => format!("{} m/s", number(speed)),
+            speed => format!("{} at {} m/s", cell.deed.name(), number(speed)),
         };
         vec![
             cell.mesh.name().to_owned(),
@@ -478,14 +484,23 @@ fn failed_of_default(rows: &[StabilityRow]) -> Table {
             number(cell.poisson_ratio),
             three_digits(1e3 * cell.timestep_s),
             cell.substeps.to_string(),
-            poke,
+            number(cell.damping_per_s),
+            tool,
             cell.start.name().to_owned(),
             row.verdict.why.clone(),
         ]
     };
     table(
         &[
-            "mesh", "E Pa", "ν", "dt ms", "substeps", "poke", "start", "why",
+            "mesh",
+            "E Pa",
+            "ν",
+            "dt ms",
+            "substeps",
+            "damping 1/s",
+            "tool",
+            "start",
+            "why",
         ],
         rows.iter()
             .filter(failed)
@@ -517,7 +532,9 @@ mod tests {
                 timestep_s: 1.0 / 60.0,
                 substeps,
                 iterations: 1,
-                poke_speed_m_s: 0.0,
+                damping_per_s: 10.0,
+                tool_speed_m_s: 0.0,
+                deed: Deed::Poke,
                 start: Start::Rest,
                 seed: 0,
             },

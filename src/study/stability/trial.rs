@@ -1,4 +1,4 @@
-//! What is done to one body: it hangs, it is wrecked, or it is poked.
+//! What is done to one body without a tool: it hangs, or it is wrecked.
 
 use super::super::contender::Contender;
 use super::super::held_body::{GRAVITY_M_S2, HeldBody};
@@ -9,8 +9,8 @@ use super::fault::{BACK_RMS, Fault, judge};
 use super::{Cell, Start, Statics};
 use crate::geom::bounds;
 use crate::sim::diagnose::{energy, volume_and_inverted};
-use crate::sim::{Simulation, ToolAction, ToolInput, ToolShape};
-use glam::{DMat3, DVec3, Vec3};
+use crate::sim::{Simulation, ToolInput};
+use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// Time without any force, in which nothing may move [s].
@@ -21,22 +21,12 @@ const RELEASE_S: f64 = 1.0;
 const SETTLE_S: f64 = 2.5;
 /// Time in which a wrecked body must be back [s]; again of 10 kPa.
 const RECOVER_S: f64 = 3.0;
-/// Damping of a body of 10 kPa or more that is to settle [1/s]. More would hold a softer one back.
-const DAMPING_PER_S: f64 = 10.0;
-/// Modulus for which these times are [Pa].
+/// Modulus and damping for which these times are [Pa], [1/s].
 const MODULUS_PA: f64 = 1e4;
-/// Radius of the tool, and how deep its front is pushed in, as shares of the thickness.
-const TOOL_RADIUS_SHARE: f32 = 0.2;
-const TOOL_DEPTH_SHARE: f32 = 0.3;
-/// Time the tool stays there, and time after it has left [s]: what rings at half a metre a second is damped to
-/// 2e-5 of it.
-const HOLD_S: f64 = 0.33;
-const AFTER_S: f64 = 2.0;
+const DAMPING_PER_S: f64 = 10.0;
 /// Energy is that of places rounded to f32; their rounding looks like so much, in the mean of it over
 /// many tetrahedra, that the highest of a hundred frames stays below.
 const ROUNDINGS: f64 = 2.0;
-/// Friction of the tool.
-const FRICTION: f32 = 0.3;
 
 /// What is measured of a trial; absent where the trial has no such thing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -87,20 +77,26 @@ impl Cell {
         (MODULUS_PA / self.youngs_modulus_pa).sqrt().max(1.0)
     }
 
-    fn frames(&self, time_s: f64) -> u32 {
+    pub fn frames(&self, time_s: f64) -> u32 {
         (time_s / self.timestep_s).round() as u32
     }
 
-    fn damping_per_s(&self) -> f32 {
-        (DAMPING_PER_S / self.slowness()) as f32
+    /// Frames in which this body comes to rest where one of 10 kPa takes so long.
+    pub fn settling_frames(&self, time_s: f64) -> u32 {
+        self.frames(time_s * self.slowness() * (DAMPING_PER_S / self.damping_per_s).max(1.0))
+    }
+
+    /// More would hold a soft body back.
+    pub fn damped_per_s(&self) -> f32 {
+        (self.damping_per_s / self.slowness()) as f32
     }
 }
 
 /// A body under way, watched.
-struct Watched<'a> {
+pub struct Watched<'a> {
     body: &'a HeldBody,
     contender: Contender,
-    simulation: Simulation,
+    pub simulation: Simulation,
     times: Times,
     frame: u32,
     not_finite_frame: Option<u32>,
@@ -108,7 +104,7 @@ struct Watched<'a> {
 }
 
 impl<'a> Watched<'a> {
-    fn new(cell: &Cell, body: &'a HeldBody, gravity_m_s2: Vec3, damping_per_s: f32) -> Self {
+    pub fn new(cell: &Cell, body: &'a HeldBody, gravity_m_s2: Vec3, damping_per_s: f32) -> Self {
         let mut setup = body.setup.clone();
         setup.gravity_m_s2 = gravity_m_s2;
         setup.damping_per_s = damping_per_s;
@@ -127,7 +123,7 @@ impl<'a> Watched<'a> {
         }
     }
 
-    fn step(&mut self, tools: &[ToolInput]) {
+    pub fn step(&mut self, tools: &[ToolInput]) {
         // Asleep it would be still whatever it did before.
         self.simulation.wake();
         let clock = Clock::start();
@@ -143,12 +139,12 @@ impl<'a> Watched<'a> {
             .max(self.body.farthest_m(self.simulation.particles()));
     }
 
-    fn steps(&mut self, frames: u32) {
+    pub fn steps(&mut self, frames: u32) {
         (0..frames).for_each(|_| self.step(&[]));
     }
 
     /// What every trial measures at its end.
-    fn measures(&self, cell: &Cell, oracle: &str) -> Measures {
+    pub fn measures(&self, cell: &Cell, oracle: &str) -> Measures {
         let report = self.simulation.report();
         let edge_m = self.body.edge_m();
         let density = f64::from(super::DENSITY_KG_M3);
@@ -169,7 +165,7 @@ impl<'a> Watched<'a> {
         }
     }
 
-    fn row(&self, cell: &Cell, mut measures: Measures) -> Row<Cell, Measures> {
+    pub fn row(&self, cell: &Cell, mut measures: Measures) -> Row<Cell, Measures> {
         let (verdict, fault) = judge(&measures);
         measures.fault = fault;
         let wall = self.times.wall();
@@ -196,8 +192,8 @@ pub fn hang(cell: &Cell, body: &HeldBody, statics: Option<&Statics>) -> Row<Cell
         hanging.step(&[]);
         highest_j = highest_j.max(energy(&hanging.simulation).total_j());
     }
-    (hanging.simulation).set_gravity_and_damping(GRAVITY_M_S2, cell.damping_per_s());
-    hanging.steps(cell.frames(SETTLE_S * cell.slowness()));
+    (hanging.simulation).set_gravity_and_damping(GRAVITY_M_S2, cell.damped_per_s());
+    hanging.steps(cell.settling_frames(SETTLE_S));
     let positions = hanging.simulation.particles();
     let mut measures = hanging.measures(cell, "Newton statics");
     measures.not_finite_frame = resting.not_finite_frame.or(measures.not_finite_frame);
@@ -230,16 +226,16 @@ fn work_of_gravity_j(body: &HeldBody, positions: &[DVec3]) -> f64 {
 }
 
 /// Volume over that of `truth`, off by, over the volume at rest.
-fn volume_error(body: &HeldBody, positions: &[Vec3], truth: &[Vec3]) -> Option<f64> {
+pub fn volume_error(body: &HeldBody, positions: &[Vec3], truth: &[Vec3]) -> Option<f64> {
     let tets = &body.setup.tets;
     let volume = |x: &[Vec3]| volume_and_inverted(x, &tets.tets).0;
     finite(((volume(positions) - volume(truth)) / volume(&tets.particles)).abs())
 }
 
-/// Settled, wrecked, let go.
-pub fn wreck(cell: &Cell, body: &HeldBody) -> Row<Cell, Measures> {
-    let mut watched = Watched::new(cell, body, GRAVITY_M_S2, cell.damping_per_s());
-    watched.steps(cell.frames(SETTLE_S * cell.slowness()));
+/// Settled, wrecked, let go: it is to come back to where it was, and that is to be where statics have it.
+pub fn wreck(cell: &Cell, body: &HeldBody, statics: Option<&Statics>) -> Row<Cell, Measures> {
+    let mut watched = Watched::new(cell, body, GRAVITY_M_S2, cell.damped_per_s());
+    watched.steps(cell.settling_frames(SETTLE_S));
     let settled = watched.simulation.particles().to_vec();
     let tets = &body.setup.tets.tets;
     let inverted = volume_and_inverted(&settled, tets).1;
@@ -250,7 +246,7 @@ pub fn wreck(cell: &Cell, body: &HeldBody) -> Row<Cell, Measures> {
         let wrecked = wrecked(cell, body, &settled);
         let still = vec![Vec3::ZERO; wrecked.len()];
         watched.simulation.set_state(&wrecked, &still);
-        for frame in 1..=cell.frames(RECOVER_S * cell.slowness()) {
+        for frame in 1..=cell.settling_frames(RECOVER_S) {
             watched.step(&[]);
             let positions = watched.simulation.particles();
             rms = rms_distance_m(positions, &settled) / body.size_m;
@@ -260,6 +256,12 @@ pub fn wreck(cell: &Cell, body: &HeldBody) -> Row<Cell, Measures> {
     }
     let mut measures = watched.measures(cell, "its own settled state");
     measures.inverted_tets_oracle = is_usable.then_some(inverted);
+    if let Some(statics) = statics {
+        measures.oracle = "its own settled state, and Newton statics".to_owned();
+        measures.inverted_tets_oracle = Some(statics.inverted_tets);
+        let tip_m = body.tip_m(watched.simulation.particles());
+        measures.sag_ratio = finite(tip_m.z / body.tip_of_oracle_m(&statics.settled_m).z);
+    }
     measures.frames_to_recover = back_since;
     measures.rms_left_sizes = Some(if rms.is_finite() { rms } else { f64::MAX });
     // A particle pulled away by ten lengths was not thrown there by the method.
@@ -303,81 +305,14 @@ fn rms_distance_m(a: &[Vec3], b: &[Vec3]) -> f64 {
     (squares.sum::<f64>() / a.len() as f64).sqrt()
 }
 
-/// A ball comes down on the middle of the top, stays a while, and leaves. No gravity.
-pub fn poke(cell: &Cell, body: &HeldBody) -> Row<Cell, Measures> {
-    let (low, high) = bounds(&body.setup.tets.particles);
-    let thickness_m = high.z - low.z;
-    let radius_m = TOOL_RADIUS_SHARE * thickness_m;
-    let way_m = cell.poke_speed_m_s as f32 * cell.timestep_s as f32;
-    let above = Vec3::new(
-        (low.x + high.x) / 2.0,
-        (low.y + high.y) / 2.0,
-        high.z + 1.5 * radius_m,
-    );
-    let deepest = high.z - TOOL_DEPTH_SHARE * thickness_m + radius_m;
-    let tool = |z: f32| ToolInput {
-        shape: ToolShape::Sphere { radius_m },
-        position_m: above.with_z(z),
-        action: ToolAction::Push,
-        friction: FRICTION,
-    };
-    let mut watched = Watched::new(cell, body, Vec3::ZERO, cell.damping_per_s());
-    let (mut penetration_m, mut force_n) = (0.0_f32, 0.0_f32);
-    let mut go = |watched: &mut Watched, z: f32| {
-        watched.step(&[tool(z)]);
-        let report = watched.simulation.report();
-        penetration_m = penetration_m.max(report.penetration_max_m);
-        force_n = report
-            .tool_forces_n
-            .iter()
-            .map(|f| f.length())
-            .fold(force_n, f32::max);
-    };
-    let down = ((above.z - deepest) / way_m).ceil().max(1.0) as u32;
-    go(&mut watched, above.z);
-    for step in 1..=down {
-        go(&mut watched, (above.z - way_m * step as f32).max(deepest));
-    }
-    for _ in 0..cell.frames(HOLD_S) {
-        go(&mut watched, deepest);
-    }
-    let middle = above.with_z(deepest).as_dvec3();
-    let tunnelled = is_inside(
-        watched.simulation.particles(),
-        &body.setup.tets.tets,
-        middle,
-    );
-    for step in 1..=down {
-        go(&mut watched, (deepest + way_m * step as f32).min(above.z));
-    }
-    watched.steps(cell.frames(AFTER_S * cell.slowness()));
-    let mut measures = watched.measures(cell, "invariants");
-    measures.penetration_share = finite(f64::from(penetration_m / thickness_m));
-    measures.tunnelled = Some(tunnelled);
-    measures.force_max_n = finite(f64::from(force_n));
-    let rest = &body.setup.tets.particles;
-    measures.volume_error_rel = volume_error(body, watched.simulation.particles(), rest);
-    watched.row(cell, measures)
-}
-
-/// Whether a place lies in one of the tetrahedra as they are now.
-pub fn is_inside(positions: &[Vec3], tets: &[[u32; 4]], place: DVec3) -> bool {
-    tets.iter().any(|tet| {
-        let [a, b, c, d] = tet.map(|corner| positions[corner as usize].as_dvec3());
-        let edges = DMat3::from_cols(b - a, c - a, d - a);
-        let weights = edges.inverse() * (place - a);
-        weights.min_element() >= 0.0 && weights.element_sum() <= 1.0
-    })
-}
-
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use crate::study::held_body::{Hold, beam};
-    use crate::study::stability::Mesh;
+    use crate::study::stability::{Deed, Mesh};
     use crate::study::sweep::State;
 
-    fn cell() -> Cell {
+    pub fn cell() -> Cell {
         Cell {
             method: Contender::XpbdNeoHookean,
             mesh: Mesh::Regular,
@@ -386,13 +321,15 @@ mod tests {
             timestep_s: 1.0 / 60.0,
             substeps: 10,
             iterations: 1,
-            poke_speed_m_s: 0.0,
+            damping_per_s: 10.0,
+            tool_speed_m_s: 0.0,
+            deed: Deed::Poke,
             start: Start::Rest,
             seed: 0,
         }
     }
 
-    fn small_beam(hold: Hold) -> HeldBody {
+    pub fn small_beam(hold: Hold) -> HeldBody {
         HeldBody::new(beam(2), 1000.0, hold)
     }
 
@@ -444,23 +381,9 @@ mod tests {
             start: Start::Pull,
             ..cell()
         };
-        let row = wreck(&pulled, &small_beam(Hold::End));
+        let row = wreck(&pulled, &small_beam(Hold::End), None);
         let frames = row.measures.frames_to_recover.expect(&row.verdict.why);
         assert!(frames > 1, "{frames}");
-    }
-
-    #[test]
-    fn pushed_tool_meets_a_force_and_a_place_inside_is_told_from_one_outside() {
-        let body = small_beam(Hold::Foot);
-        let poked = Cell {
-            poke_speed_m_s: 0.5,
-            ..cell()
-        };
-        let row = poke(&poked, &body);
-        assert!(row.measures.force_max_n.expect("finite") > 0.0);
-        let tets = &body.setup.tets;
-        assert!(is_inside(&tets.particles, &tets.tets, DVec3::splat(0.03)));
-        assert!(!is_inside(&tets.particles, &tets.tets, DVec3::splat(0.07)));
     }
 
     #[test]
