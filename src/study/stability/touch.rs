@@ -114,7 +114,7 @@ mod tests {
             deed,
             ..cell()
         };
-        // Cells no larger than the tool's radius: a smaller tool rocks from face to face.
+        // Cells no larger than the tool's radius: on larger ones millimetres a second are left.
         touch(&cell, &HeldBody::new(beam(5), 1000.0, Hold::Foot))
     }
 
