@@ -142,10 +142,7 @@ pub fn run(
     rest(&mut simulation, cell.method);
     let off_m = (simulation.points().iter().zip(&at_rest))
         .map(|(x, rest)| x.distance(*rest))
-        .fold(
-            0.0,
-            |worst: f32, off| if off >= worst { off } else { off.max(worst) },
-        );
+        .fold(0.0, f32::max);
     measures.off_rest_share = finite(f64::from(off_m / places.extent_m));
     let report = simulation.report();
     measures.inverted_tets = report.inverted_tets;
