@@ -433,6 +433,32 @@ fn poor_tetrahedra_that_tremble_or_stay_folded_are_handed_over_which_is_said_and
     }
 }
 
+#[test]
+fn a_body_handed_over_stays_so_through_changed_damping_and_tissue_and_is_judged_anew_with_other_steps()
+ {
+    let sets = ["solver.substeps=50", "solver.youngs_modulus_pa=10000"];
+    let mut session = session(ORGAN, &sets).expect("a sound scene");
+    for _ in 0..360 {
+        session.tick();
+    }
+    let frame = session.handed_over_frame().expect("it trembled");
+    session.scene.body.damping_per_s = 4.0;
+    session.scene.solver.youngs_modulus_pa = 9000.0;
+    session.set_solver();
+    let taken = session.solver();
+    assert_eq!(taken.method, Method::Implicit);
+    assert_eq!(taken.youngs_modulus_pa, 9000.0);
+    assert_eq!(session.handed_over_frame(), Some(frame));
+    session.scene.solver.substeps = 60;
+    session.set_solver();
+    assert_eq!(
+        session.solver(),
+        session.scene.solver,
+        "nothing is known of these steps"
+    );
+    assert_eq!(session.handed_over_frame(), None);
+}
+
 /// A ball that comes to rest 4 mm deep in the top of the organ and stays.
 const RESTING_BALL: &str = "
 [[tool]]

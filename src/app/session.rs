@@ -37,6 +37,8 @@ pub struct Session {
     frame: u32,
     /// When and why another solver took the place of the scene's.
     handed_over: Option<(u32, HandOver)>,
+    /// The scene's solver when that was last decided.
+    decided_for: SolverParams,
 }
 
 /// What one time step did.
@@ -93,6 +95,7 @@ impl Session {
             hand: None,
             frame: 0,
             handed_over: cause.map(|cause| (0, cause)),
+            decided_for: scene.solver,
             scene,
             mesh,
             rest,
@@ -189,15 +192,42 @@ impl Session {
     pub fn reset(&mut self) {
         self.frame = 0;
         self.simulation.reset();
-        // A run that has shown waves to grow may have been handed over.
-        self.set_solver();
+        self.set_gravity_and_damping();
+        // What the run has shown is forgotten with it.
+        self.take_scenes_solver();
     }
 
-    /// Takes over changed knobs of the solver, gravity and damping.
+    /// Takes over changed knobs of the solver, gravity and damping. A body that has shown that it needs `implicit` keeps
+    /// it, with a changed material too, until the method or its steps are changed.
     pub fn set_solver(&mut self) {
+        self.set_gravity_and_damping();
+        let (asked, before) = (self.scene.solver, self.decided_for);
+        if asked == before {
+            return;
+        }
+        let shown = self
+            .handed_over
+            .filter(|(_, cause)| *cause != HandOver::TooStiff);
+        self.take_scenes_solver();
+        let same_steps = SolverParams {
+            youngs_modulus_pa: before.youngs_modulus_pa,
+            poisson_ratio: before.poisson_ratio,
+            ..asked
+        } == before;
+        if let (Some((frame, cause)), None, true) = (shown, self.handed_over, same_steps) {
+            self.handed_over = Some((frame, cause.take(&mut self.simulation)));
+        }
+    }
+
+    fn set_gravity_and_damping(&mut self) {
         let body = &self.scene.body;
         self.simulation
             .set_gravity_and_damping(body.gravity_m_s2, body.damping_per_s);
+    }
+
+    /// The scene's solver, or `implicit` where the material alone asks for that.
+    fn take_scenes_solver(&mut self) {
+        self.decided_for = self.scene.solver;
         self.simulation.set_params(self.scene.solver);
         let cause = HandOver::at_start(&mut self.simulation);
         self.handed_over = cause.map(|cause| (self.frame, cause));

@@ -39,7 +39,8 @@ impl HandOver {
         }
     }
 
-    fn take(self, simulation: &mut Simulation) -> Self {
+    /// Hands the body over for this reason.
+    pub fn take(self, simulation: &mut Simulation) -> Self {
         let asked = simulation.params();
         simulation.set_params(SolverParams {
             method: Method::Implicit,
