@@ -177,6 +177,44 @@ fn overlays_sides_and_bad_files_change_the_picture_and_end_nothing() {
 }
 
 #[test]
+fn typed_letters_are_no_keys_tab_hides_the_panel_and_a_recording_is_not_lost_with_the_window() {
+    let Some(desk) = Desk::new("keys", 75) else {
+        return;
+    };
+    let mut window = desk.window("slab", &[]);
+    desk.tool(&["mousemove", "430", "360"]);
+    let beside_panel = desk.picture(1);
+    desk.tool(&["key", "Tab"]);
+    sleep(Duration::from_secs(2));
+    let whole = desk.picture(2);
+    assert!(
+        whole.width() > beside_panel.width(),
+        "the panel is still there"
+    );
+    desk.tool(&["key", "Tab"]);
+    sleep(Duration::from_secs(2));
+    // Clicked and typed within a frame or two. A letter that got through as a key would start a recording.
+    desk.tool(&["mousemove", "960", "62", "click", "1", "key", "o"]);
+    desk.tool(&["type", "to"]);
+    sleep(Duration::from_secs(2));
+    desk.close(&mut window);
+    let recorded = desk.folder.join("palpate-001.toml");
+    assert!(!recorded.exists(), "typing started a recording");
+
+    let mut window = desk.window("slab", &[]);
+    desk.tool(&["mousemove", "430", "360", "key", "o"]);
+    sleep(Duration::from_secs(1));
+    desk.tool(&["mousedown", "1"]);
+    for y in ["364", "368", "372"] {
+        desk.tool(&["mousemove", "430", y]);
+        sleep(Duration::from_millis(200));
+    }
+    desk.tool(&["mouseup", "1"]);
+    desk.close(&mut window);
+    assert_replays(&recorded);
+}
+
+#[test]
 fn a_saved_scene_opens_to_the_same_picture() {
     let Some(desk) = Desk::new("saved", 73) else {
         return;

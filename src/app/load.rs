@@ -31,6 +31,8 @@ pub struct LoadedBody {
     pub rest: RestBox,
     /// What the simulation starts from.
     pub setup: BodySetup,
+    /// Edge of the lattice's cubes [m]; `None` for a body of given tetrahedra.
+    pub cell_m: Option<f32>,
     /// The pictures that its file brought.
     pub pictures: OwnPictures,
     /// What was guessed, repaired or left out, a sentence each.
@@ -91,6 +93,8 @@ struct Tissue {
     masses_kg: Vec<f32>,
     fill: Vec<f32>,
     embedding: Embedding,
+    /// Edge of the cubes of a lattice [m].
+    cell_m: Option<f32>,
 }
 
 impl From<Lattice> for Tissue {
@@ -100,6 +104,7 @@ impl From<Lattice> for Tissue {
             masses_kg: lattice.masses_kg,
             fill: lattice.fill,
             embedding: lattice.embedding,
+            cell_m: Some(lattice.cell_m),
         }
     }
 }
@@ -174,6 +179,7 @@ pub fn body(scene: &Scene) -> Result<LoadedBody, AppError> {
         mesh,
         rest,
         setup: setup.numbered_along(),
+        cell_m: tissue.cell_m,
         pictures,
         notes,
     })
@@ -315,6 +321,7 @@ fn tets(
     let tissue = Tissue {
         masses_kg,
         fill: vec![1.0; tets.tets.len()],
+        cell_m: None,
         embedding: Embedding {
             particles: skin
                 .particles

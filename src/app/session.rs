@@ -23,6 +23,8 @@ pub struct Session {
     pub mesh: SurfaceMesh,
     /// The box around it.
     pub rest: RestBox,
+    /// Edge of the lattice's cubes [m]; `None` for a body of given tetrahedra.
+    pub cell_m: Option<f32>,
     /// The pictures that its file brought.
     pub pictures: OwnPictures,
     /// What was guessed or repaired while loading.
@@ -74,6 +76,7 @@ impl Session {
             mesh,
             rest,
             setup,
+            cell_m,
             pictures,
             notes,
         } = load::body(&scene)?;
@@ -99,6 +102,7 @@ impl Session {
             scene,
             mesh,
             rest,
+            cell_m,
             pictures,
             notes,
             markers,

@@ -208,9 +208,13 @@ pub fn body(ui: &mut Ui, session: &mut Session) {
     if ui.add(size.text("size [m]")).changed() {
         body.size_m = Some(size_m);
     }
-    if let Some(cell_m) = &mut body.cell_m {
-        let cell = Slider::new(cell_m, 1e-3..=0.05).logarithmic(true);
-        ui.add(cell.text("cell [m]"));
+    if let Some(in_use_m) = session.cell_m {
+        // Left out, it is chosen by the shape and a budget.
+        let mut cell_m = body.cell_m.unwrap_or(in_use_m);
+        let cell = Slider::new(&mut cell_m, 5e-4..=0.05).logarithmic(true);
+        if ui.add(cell.text("cell [m]")).changed() {
+            body.cell_m = Some(cell_m);
+        }
     }
 }
 

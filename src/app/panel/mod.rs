@@ -170,6 +170,7 @@ pub fn show(
             .show(ui, |ui| {
                 egui::ScrollArea::vertical().show(ui, |ui| {
                     run::section(ui, state, session, shown.opening, asks);
+                    said(ui, state);
                     plots::section(ui, state, session, &shown);
                     knobs::overlays(ui, state);
                     knobs::surface(ui, session);
@@ -180,7 +181,6 @@ pub fn show(
                     knobs::beat(ui, session);
                     knobs::hand(ui, state, session);
                     knobs::camera(ui, session, asks);
-                    said(ui, state);
                 });
             });
     }
@@ -207,8 +207,7 @@ pub fn show(
 /// What was done last, and what a body that was opened needed.
 fn said(ui: &mut Ui, state: &PanelState) {
     if !state.message.is_empty() {
-        ui.separator();
-        ui.label(egui::RichText::new(&state.message).weak());
+        ui.label(egui::RichText::new(&state.message).small());
     }
 }
 

@@ -5,14 +5,52 @@ use super::shown::Drag;
 use crate::app::hand::Hand;
 use crate::app::orbit::{Ray, Side};
 use crate::sim::ToolAction;
+use egui::{Event, Key, Modifiers};
 use glam::Vec2;
 use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
-use winit::keyboard::{KeyCode, PhysicalKey};
+
+/// A key that was pressed, by what is printed on it.
+#[derive(Clone, Copy, Debug)]
+pub struct Pressed {
+    key: Key,
+    modifiers: Modifiers,
+}
+
+/// The keys that were pressed in the events of a frame, in order. Tab, by which the panel would be walked through, is
+/// taken from `events` if `takes_tab`.
+pub fn keys(events: &mut Vec<Event>, takes_tab: bool) -> Vec<Pressed> {
+    let mut pressed = Vec::new();
+    events.retain(|event| {
+        let &Event::Key {
+            key,
+            pressed: is_down,
+            modifiers,
+            ..
+        } = event
+        else {
+            return true;
+        };
+        if is_down {
+            pressed.push(Pressed { key, modifiers });
+        }
+        !(takes_tab && key == Key::Tab)
+    });
+    pressed
+}
+
+impl Pressed {
+    /// Whether it closes the window, whatever has the keyboard.
+    pub fn closes(self) -> bool {
+        self.key == Key::Q && self.modifiers.command
+    }
+}
 
 impl Shown {
-    /// Takes an event that is neither a size nor the wish to draw or to close.
+    /// Takes an event that is neither a size nor the wish to draw or to close. Keys wait for the panel, which may have
+    /// a use for them: see [`keys`].
     pub fn input(&mut self, event: &WindowEvent) {
-        let response = self.screen.egui.on_window_event(&self.screen.window, event);
+        // Whether the panel takes the event is known once it has run.
+        let _ = self.screen.egui.on_window_event(&self.screen.window, event);
         match event {
             WindowEvent::CursorMoved { position, .. } => {
                 let was_in_view = self.cursor_in_view();
@@ -41,7 +79,6 @@ impl Shown {
                 };
                 self.scrolled(notches);
             }
-            WindowEvent::ModifiersChanged(now) => self.control_held = now.state().control_key(),
             WindowEvent::CursorLeft { .. } if self.drag != Drag::Tool => self.drag = Drag::Nothing,
             // Whoever looks elsewhere has let go, though nobody told.
             WindowEvent::Focused(false) => self.let_go(),
@@ -51,13 +88,6 @@ impl Shown {
             }
             WindowEvent::HoveredFile(_) => self.state.drop_hovers = true,
             WindowEvent::HoveredFileCancelled => self.state.drop_hovers = false,
-            WindowEvent::KeyboardInput { event, .. }
-                if event.state == ElementState::Pressed && !response.consumed =>
-            {
-                if let PhysicalKey::Code(code) = event.physical_key {
-                    self.key(code);
-                }
-            }
             _ => {}
         }
         self.wake();
@@ -140,32 +170,35 @@ impl Shown {
         }
     }
 
-    fn key(&mut self, code: KeyCode) {
+    /// Does what a key is for, where the panel had no use for it.
+    pub fn key(&mut self, pressed: Pressed) {
         let shown = &mut self.state.overlays;
-        match code {
-            KeyCode::Space => self.state.paused = !self.state.paused,
-            KeyCode::Period | KeyCode::KeyN => self.state.step_once = true,
-            KeyCode::KeyR => self.reset(),
-            KeyCode::KeyP => self.play_script(),
-            KeyCode::KeyS | KeyCode::F12 => self.state.screenshot = true,
-            KeyCode::KeyC => self.reset_camera(),
-            KeyCode::Digit1 => self.look(Side::Front),
-            KeyCode::Digit2 => self.look(Side::Right),
-            KeyCode::Digit3 => self.look(Side::Top),
-            KeyCode::Digit4 => self.look(Side::Kept),
-            KeyCode::KeyO => self.record_or_stop(),
-            KeyCode::KeyK => self.save_scene(),
-            KeyCode::KeyV => shown.normals = !shown.normals,
-            KeyCode::KeyT => shown.tangents = !shown.tangents,
-            KeyCode::KeyL => shown.primitives = !shown.primitives,
-            KeyCode::KeyB => shown.lattice = !shown.lattice,
-            KeyCode::KeyX => shown.section = !shown.section,
-            KeyCode::KeyE => self.state.light_error_shown = !self.state.light_error_shown,
-            KeyCode::KeyU => self.state.changes_open = !self.state.changes_open,
-            KeyCode::Escape => self.close_something(),
-            KeyCode::KeyQ if self.control_held => self.wants_to_close = true,
-            KeyCode::Tab => self.state.panel_open = !self.state.panel_open,
-            KeyCode::F1 | KeyCode::KeyH => self.state.help_open = !self.state.help_open,
+        if pressed.modifiers.command || pressed.modifiers.alt {
+            return;
+        }
+        match pressed.key {
+            Key::Space => self.state.paused = !self.state.paused,
+            Key::Period | Key::N => self.state.step_once = true,
+            Key::R => self.reset(),
+            Key::P => self.play_script(),
+            Key::S | Key::F12 => self.state.screenshot = true,
+            Key::C => self.reset_camera(),
+            Key::Num1 => self.look(Side::Front),
+            Key::Num2 => self.look(Side::Right),
+            Key::Num3 => self.look(Side::Top),
+            Key::Num4 => self.look(Side::Kept),
+            Key::O => self.record_or_stop(),
+            Key::K => self.save_scene(),
+            Key::V => shown.normals = !shown.normals,
+            Key::T => shown.tangents = !shown.tangents,
+            Key::L => shown.primitives = !shown.primitives,
+            Key::B => shown.lattice = !shown.lattice,
+            Key::X => shown.section = !shown.section,
+            Key::E => self.state.light_error_shown = !self.state.light_error_shown,
+            Key::U => self.state.changes_open = !self.state.changes_open,
+            Key::Escape => self.close_something(),
+            Key::Tab => self.state.panel_open = !self.state.panel_open,
+            Key::F1 | Key::H => self.state.help_open = !self.state.help_open,
             _ => {}
         }
     }

@@ -76,6 +76,11 @@ pub fn window(options: &WindowOptions) -> Result<Outcome, AppError> {
     event_loop
         .run_app(&mut app)
         .map_err(|e| AppError::Window(e.to_string()))?;
+    if let Some(shown) = &mut app.shown {
+        if shown.end_take() {
+            eprintln!("palpate: {}", shown.last_said());
+        }
+    }
     if let (Some(shown), Some(log)) = (&app.shown, &options.log) {
         shown.write_log(log)?;
     }
@@ -131,18 +136,14 @@ impl ApplicationHandler for App {
         match event {
             WindowEvent::CloseRequested => event_loop.exit(),
             WindowEvent::RedrawRequested => {
-                if let Err(error) = shown.frame() {
-                    self.failed = Some(error);
+                let drawn = shown.frame();
+                if shown.wants_to_close || drawn.is_err() {
+                    self.failed = drawn.err();
                     event_loop.exit();
                 }
             }
             WindowEvent::Resized(size) => shown.resize(size),
-            event => {
-                shown.input(&event);
-                if shown.wants_to_close {
-                    event_loop.exit();
-                }
-            }
+            event => shown.input(&event),
         }
     }
 

@@ -36,16 +36,38 @@ impl Shown {
                 self.state.paused = false;
                 self.state.message = "recording from rest".to_owned();
             }
-            Some(take) if take.is_empty() => self.state.message = "nothing was recorded".to_owned(),
-            Some(take) => {
-                let about = format!(
-                    "# Recorded by hand in palpate's window. Its replay ends in the state\n# {}\n\n",
-                    self.session.state_sha256()
-                );
-                self.save(&take.scene(&self.session), &about);
-            }
+            Some(take) => self.save_take(&take),
         }
         self.state.records = self.take.is_some();
+    }
+
+    /// Ends and saves a take that is under way: what is recorded is not lost with the window or the scene. Whether there
+    /// was one.
+    pub fn end_take(&mut self) -> bool {
+        let take = self.take.take();
+        if let Some(take) = &take {
+            self.save_take(take);
+            self.state.records = false;
+        }
+        take.is_some()
+    }
+
+    /// What was done last, or went wrong in doing it.
+    pub fn last_said(&self) -> &str {
+        let state = &self.state;
+        state.error.as_deref().unwrap_or(&state.message)
+    }
+
+    fn save_take(&mut self, take: &Take) {
+        if take.is_empty() {
+            self.state.message = "nothing was recorded".to_owned();
+            return;
+        }
+        let about = format!(
+            "# Recorded by hand in palpate's window. Its replay ends in the state\n# {}\n\n",
+            self.session.state_sha256()
+        );
+        self.save(&take.scene(&self.session), &about);
     }
 
     /// Saves the scene as it is now, with the knobs as they were turned and the camera where it was moved to.

@@ -1,5 +1,6 @@
 //! A window that is open: the session it shows, and what turns both into a frame.
 
+use super::input::keys;
 use super::opening::{Opened, Opening, Wanted};
 use super::screen::{Presented, Screen};
 use crate::app::hand::Hand;
@@ -59,7 +60,8 @@ pub struct Shown {
     last_frame: Instant,
     owed_s: f32,
     pub(super) wants_to_close: bool,
-    pub(super) control_held: bool,
+    /// How many of the session's notes have been said.
+    notes_said: usize,
 }
 
 /// What a moving mouse does.
@@ -98,6 +100,7 @@ impl Shown {
         for note in &session.notes {
             eprintln!("{scene_name}: {note}");
         }
+        let notes_said = session.notes.len();
         let renderer = Renderer::new(screen.gpu.clone(), &session, screen.size())?;
         screen.show_picture(renderer.picture_view());
         let orbit = renderer.scene_orbit(&session);
@@ -125,7 +128,7 @@ impl Shown {
             last_frame: Instant::now(),
             owed_s: 0.0,
             wants_to_close: false,
-            control_held: false,
+            notes_said,
         })
     }
 
@@ -245,6 +248,7 @@ impl Shown {
             last_tick = Some(tick);
         }
 
+        self.say_new_notes();
         self.take_light_error();
         self.cut_open();
         let (panel, view, scale) = self.panel()?;
@@ -270,6 +274,18 @@ impl Shown {
             self.state.wants_frame = true;
         }
         Ok(())
+    }
+
+    /// Says what the session has come to say since the frame before.
+    fn say_new_notes(&mut self) {
+        let notes = &self.session.notes[self.notes_said..];
+        for note in notes {
+            eprintln!("{}: {note}", self.state.scene_name);
+        }
+        if let Some(last) = notes.last() {
+            self.state.message.clone_from(last);
+        }
+        self.notes_said = self.session.notes.len();
     }
 
     /// How deep a tool is pushed in, if one is: the hand's, or the script's.
@@ -321,8 +337,12 @@ impl Shown {
     /// Runs the panel and does what it asks for; says what is drawn of it, where the picture is and how many pixels a
     /// point has.
     fn panel(&mut self) -> Result<(Vec<egui::ClippedPrimitive>, egui::Rect, f32), AppError> {
-        let input = self.screen.egui.take_egui_input(&self.screen.window);
+        let mut input = self.screen.egui.take_egui_input(&self.screen.window);
         let context = self.screen.egui.egui_ctx().clone();
+        let panel_listens =
+            || context.egui_wants_keyboard_input() || egui::Popup::is_any_open(&context);
+        let listened = panel_listens();
+        let keys = keys(&mut input.events, !listened);
         let error = self
             .light_error_picture
             .as_ref()
@@ -352,6 +372,11 @@ impl Shown {
         ];
         for ask in asks {
             self.answer(ask);
+        }
+        self.wants_to_close |= keys.iter().any(|pressed| pressed.closes());
+        // A field that was left by a key had its use for it, and so has one that was clicked in the same frame.
+        if !listened && !panel_listens() {
+            keys.into_iter().for_each(|pressed| self.key(pressed));
         }
         if !context.input(|input| input.pointer.any_down()) {
             self.do_awaited();
@@ -455,16 +480,20 @@ impl Shown {
     }
 
     fn show_opened(&mut self, opened: Opened) {
+        let kept_take = self.end_take().then(|| self.last_said().to_owned());
         self.session = opened.session;
         self.renderer = opened.renderer;
+        self.notes_said = self.session.notes.len();
         self.hand = None;
         self.drag = Drag::Nothing;
         self.reset_camera();
         self.state.begin(opened.name.as_deref(), &self.session);
+        if let Some(kept) = kept_take {
+            self.state.message = format!("{kept}\n{}", self.state.message);
+        }
         self.history = History::default();
         self.push = PushCurve::default();
         self.section = None;
-        self.take = None;
         self.light_error.forget();
         self.screen.show_picture(self.renderer.picture_view());
     }
