@@ -28,7 +28,8 @@ impl HandOver {
 
     /// The same after a step, by what the body has shown.
     pub fn after_step(simulation: &mut Simulation) -> Option<Self> {
-        if simulation.sags() && simulation.faithful_substeps().is_some() {
+        let sags = simulation.sags() && simulation.faithful_substeps().is_some();
+        if sags || simulation.waves_grow_on() {
             Some(Self::WavesGrew.take(simulation))
         } else if simulation.trembles() {
             Some(Self::Trembled.take(simulation))

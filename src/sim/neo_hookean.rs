@@ -70,6 +70,9 @@ const CARRIED_STIFFNESS_SAFE: f32 = 5.0;
 /// waves that grow; a beam that swings has half of it at the turning points.
 const GROWN_RESIDUAL: f64 = 0.3;
 const GROWN_STEPS: u32 = 4;
+/// Waves that go on for so many steps though the body carries as much over as is safe for a mean one: its mesh is much finer
+/// in one place, and they grow there. A blow is over sooner.
+const GROWN_ON_STEPS: u32 = 12;
 /// A stress of more Young's moduli than this is carried over cut down to it: beyond there are wrecks, and there the
 /// explicit step throws things about. Small tetrahedra at the rim of a clamp have 2 and more for good, and a body
 /// whose stress is cut keeps moving.
@@ -122,8 +125,8 @@ enum Carry {
     #[default]
     Most,
     Growing(u32),
-    /// As much as is safe: waves have grown.
-    Safe,
+    /// As much as is safe: waves have grown, and have gone on for so many steps in a row since.
+    Safe(u32),
 }
 
 /// How all tetrahedra stand.
@@ -243,7 +246,12 @@ impl NeoHookean {
 
     /// Whether waves have been seen to grow in it, and it sags since.
     pub fn sags(&self) -> bool {
-        self.carry == Carry::Safe && self.kept_by_all < 1.0
+        matches!(self.carry, Carry::Safe(_)) && self.kept_by_all < 1.0
+    }
+
+    /// Whether waves have grown on since.
+    pub fn waves_grow_on(&self) -> bool {
+        matches!(self.carry, Carry::Safe(steps) if steps >= GROWN_ON_STEPS)
     }
 
     /// κ of every tetrahedron.
@@ -267,7 +275,7 @@ impl NeoHookean {
                 let size = (SMALL_TETS / self.tet_count.max(1) as f32).cbrt();
                 CARRIED_STIFFNESS_MAX[0] * size.min(1.0)
             }
-            Carry::Safe => CARRIED_STIFFNESS_SAFE,
+            Carry::Safe(_) => CARRIED_STIFFNESS_SAFE,
         };
         a_sweep * params.iterations as f32
     }
@@ -307,15 +315,17 @@ impl NeoHookean {
 
     /// Carries less over from now on if waves have been growing.
     fn watch(&mut self, residual_rms: f64) {
-        let grows = residual_rms > GROWN_RESIDUAL && !self.restoring && self.kept_by_all >= 1.0;
+        let is_shaken = residual_rms > GROWN_RESIDUAL && !self.restoring;
+        let grows = is_shaken && self.kept_by_all >= 1.0;
         self.carry = match self.carry {
             Carry::Growing(steps) if grows && steps + 1 >= GROWN_STEPS => {
                 self.ready_for = None;
-                Carry::Safe
+                Carry::Safe(0)
             }
             Carry::Growing(steps) if grows => Carry::Growing(steps + 1),
             Carry::Most if grows => Carry::Growing(1),
-            Carry::Safe => Carry::Safe,
+            Carry::Safe(steps) if is_shaken => Carry::Safe(steps.saturating_add(1)),
+            Carry::Safe(_) => Carry::Safe(0),
             Carry::Most | Carry::Growing(_) => Carry::Most,
         };
     }

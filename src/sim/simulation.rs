@@ -350,14 +350,19 @@ impl Simulation {
         matches!(&self.model, Model::NeoHookean(model) if model.sags())
     }
 
+    /// Whether waves have grown in it that carrying less stress over does not still.
+    pub fn waves_grow_on(&self) -> bool {
+        matches!(&self.model, Model::NeoHookean(model) if model.waves_grow_on())
+    }
+
     /// Whether some of the body has gone back and forth from substep to substep for half a second, as poor tetrahedra
     /// can with `xpbd-neo-hookean`.
     pub fn trembles(&self) -> bool {
         matches!(self.model, Model::NeoHookean(_)) && self.calm.trembles(self.solver.timestep_s)
     }
 
-    /// Whether tetrahedra have been inside out for half a second with nothing pressing, as a sliver can with too few
-    /// substeps of `xpbd-neo-hookean`.
+    /// Whether tetrahedra have been inside out for half a second while no tool moved that presses, as a sliver can with
+    /// too few substeps of `xpbd-neo-hookean`.
     pub fn is_folded(&self) -> bool {
         matches!(self.model, Model::NeoHookean(_)) && self.calm.is_folded(self.solver.timestep_s)
     }
@@ -411,8 +416,8 @@ impl Simulation {
         // A body that is led back rests nowhere, though a load may hold it still: its own material is yet to answer.
         let stirred = stirred || beats || self.model.is_restoring();
         let forces_n = self.tools.forces_n(self.solver.substeps);
-        if forces_n.iter().any(|force_n| *force_n != Vec3::ZERO) {
-            // What is pressed may well be folded, and that passes with the tool.
+        if stirred && forces_n.iter().any(|force_n| *force_n != Vec3::ZERO) {
+            // What is being pressed may well be folded, and that passes with the tool; not where it stays.
             self.calm.forget_folds();
         }
         let inverted_tets = if self.model.is_restoring() {

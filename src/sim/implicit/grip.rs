@@ -7,8 +7,10 @@ use super::{
 use crate::sim::{contact::ActiveContact, handle::Handle, particles::Particles, tools::Tools};
 use glam::{DMat3, DVec3, DVec4, Vec3};
 
-/// Stiffness of a barrier over that of the body where it pushes.
-const OVER_BODY: f64 = 10.0;
+/// Stiffness of a barrier over that of the body where it pushes. The body's is mostly against a change of volume, and many
+/// places of a fine surface share nodes: at ten times as much the nodes of nearly incompressible tissue rattle between
+/// tool and tissue, round after round, and what the tool feels is off by any factor.
+const OVER_BODY: f64 = 2.0;
 /// Stiffness of friction, until it slips, over that of the body. Ten times as stiff it throws the
 /// force of a tool that comes in 3 % too high, since it slips and sticks in turn; with a tenth the
 /// rounds take hold more slowly, and nothing is gained.
