@@ -56,6 +56,9 @@ pub fn window(options: &WindowOptions) -> Result<Outcome, AppError> {
     };
     let Some(event_loop) = event_loop else {
         eprintln!("palpate: no display, so the scene's script runs as a replay into out/");
+        if options.log.is_some() {
+            eprintln!("palpate: --log is of a window; out/frames.csv has the frames of the replay");
+        }
         return replay(&ReplayOptions {
             scene: options.scene.clone(),
             sets: options.sets.clone(),
@@ -76,10 +79,10 @@ pub fn window(options: &WindowOptions) -> Result<Outcome, AppError> {
     event_loop
         .run_app(&mut app)
         .map_err(|e| AppError::Window(e.to_string()))?;
-    if let Some(shown) = &mut app.shown {
-        if shown.end_take() {
-            eprintln!("palpate: {}", shown.last_said());
-        }
+    if let Some(shown) = &mut app.shown
+        && shown.end_take()
+    {
+        eprintln!("palpate: {}", shown.last_said());
     }
     if let (Some(shown), Some(log)) = (&app.shown, &options.log) {
         shown.write_log(log)?;

@@ -118,6 +118,12 @@ impl Grip {
         }
     }
 
+    /// Norm of the forces on the body [N].
+    pub fn load_n(&self, displacements: &[DVec4]) -> f64 {
+        let squared = |hold: &Hold| hold.force_n(displacements).length_squared();
+        self.holds.iter().map(squared).sum::<f64>().sqrt()
+    }
+
     /// Gives the forces at `displacements` to the tools, and takes them for the multipliers of the
     /// next round. Whether they have settled.
     pub fn settle(&mut self, tools: &mut Tools, span: Span, displacements: &[DVec4]) -> bool {

@@ -109,7 +109,7 @@ pub struct Implicit {
     sound: Vec<DVec4>,
     /// Elastic energy at `now`; `None` if that was not the end of a substep [J].
     elastic_j: Option<f64>,
-    /// Residual over load after the last substep.
+    /// Residual over load, that of the tools included, after the last substep.
     residual_share: f64,
     /// Whether the body was wrecked in the last substep and led back.
     restoring: bool,
@@ -250,7 +250,8 @@ impl Implicit {
             return;
         };
         self.elastic_j = Some(end.strain.energy_j);
-        self.residual_share = end.residual_n / self.goal.load_n.max(f64::MIN_POSITIVE);
+        let load_n = self.goal.load_n.max(self.goal.grip.load_n(&self.next));
+        self.residual_share = end.residual_n / load_n.max(f64::MIN_POSITIVE);
         for (node, &particle) in self.order.particle[..self.order.free].iter().enumerate() {
             if !self.velocities_before[node].is_finite() {
                 continue;

@@ -263,14 +263,14 @@ fn waves_that_grow_for_four_steps_make_a_body_carry_less_until_it_is_put_elsewhe
         grown,
     ] {
         model.watch(residual);
-        assert_ne!(model.carry, Carry::Safe);
+        assert!(!matches!(model.carry, Carry::Safe(_)));
     }
     model.watch(grown);
-    assert_eq!(model.carry, Carry::Safe);
+    assert!(matches!(model.carry, Carry::Safe(_)));
     // Calm or not: what was seen once comes again.
     model.watch(0.0);
     model.begin_substep(&Team::alone(), &mut places, &PARAMS);
-    assert_eq!(model.carry, Carry::Safe);
+    assert!(matches!(model.carry, Carry::Safe(_)));
     model.forget(&mut places, &PARAMS);
     assert_eq!(model.carry, Carry::Most);
 }
@@ -284,7 +284,7 @@ fn another_time_step_forgets_that_waves_grew() {
         model.watch(2.0 * GROWN_RESIDUAL);
     }
     model.begin_substep(&Team::alone(), &mut places, &PARAMS);
-    assert_eq!(model.carry, Carry::Safe);
+    assert!(matches!(model.carry, Carry::Safe(_)));
     let half = SolverParams {
         substeps: 2,
         ..PARAMS
